@@ -1,0 +1,1 @@
+//! What the evaluation reports measure (SPEC section 9), as pure functions.

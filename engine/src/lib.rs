@@ -1,0 +1,28 @@
+//! Place recognition by texts of free-space density: values in, values out.
+//!
+//! The science is Maffei's "Translating sensor measurements into texts for localization and mapping with mobile
+//! robots". Everything here is a pure function or a plain value: no HTTP, no storage, no clock, no files, no global
+//! randomness. The same input gives the same bytes. Units are metres, radians and seconds throughout.
+//!
+//! Read the rooms in the order of the data flow:
+//! [`scan`] → [`grid`] → [`density`] → [`text`] → [`index`] → [`matching`], [`retrieval`] → [`registration`] →
+//! [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
+//! [`simulation`] and [`evaluation`], which feed and judge it.
+
+pub mod config;
+pub mod density;
+pub mod evaluation;
+pub mod formats;
+pub mod geometry;
+pub mod grid;
+pub mod index;
+pub mod localization;
+pub mod mapping;
+pub mod matching;
+pub mod pose_graph;
+pub mod registration;
+pub mod retrieval;
+pub mod scan;
+pub mod semantics;
+pub mod simulation;
+pub mod text;

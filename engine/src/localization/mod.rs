@@ -1,0 +1,1 @@
+//! Monte-Carlo localisation in a served map (thesis 3.3).

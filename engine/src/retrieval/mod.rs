@@ -1,0 +1,1 @@
+//! Density profiles as a second way to retrieve places (SPEC section 4).

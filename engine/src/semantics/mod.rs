@@ -1,0 +1,1 @@
+//! Place labels: corridor, corner, bifurcation, dead-end, hall (thesis chapter 6).

@@ -1,0 +1,1 @@
+//! Simulated robots in occupancy worlds, seeded and repeatable.

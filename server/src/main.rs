@@ -1,0 +1,3 @@
+//! The `locution` binary: arguments, configuration, logging, start; nothing else.
+
+fn main() {}
