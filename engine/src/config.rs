@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::matching::MatchingConfig;
+
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{field}: {problem}")]
@@ -23,7 +25,10 @@ impl ConfigError {
 /// Everything the engine can be told, per site; stored with every text it produced.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct EngineConfig {}
+pub struct EngineConfig {
+    /// When stretches of text match.
+    pub matching: MatchingConfig,
+}
 
 impl EngineConfig {
     /// Checks every value.
@@ -31,6 +36,6 @@ impl EngineConfig {
     /// # Errors
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        Ok(())
+        self.matching.validate("matching")
     }
 }
