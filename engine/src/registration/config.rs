@@ -47,7 +47,8 @@ impl OdometryNoise {
     pub fn covariance(&self, motion: &Pose2) -> Matrix3<f64> {
         let distance_m = motion.x.hypot(motion.y);
         let distance_sd = self.distance_floor_m + self.distance_per_m * distance_m;
-        let turn_sd = self.turn_floor_rad + self.turn_per_rad * motion.theta.abs() + self.turn_per_m_rad * distance_m;
+        let turn_sd =
+            self.turn_floor_rad + self.turn_per_rad * motion.theta.abs() + self.turn_per_m_rad * distance_m;
         Matrix3::from_diagonal(&nalgebra::Vector3::new(
             distance_sd * distance_sd,
             distance_sd * distance_sd,

@@ -51,7 +51,8 @@ impl LikelihoodGrid {
     /// The best-scoring pose of the window around `start`; ties go to the pose nearest to the start in search order.
     /// None when no return lies on the grid.
     pub fn best_pose(&self, points: &[Point2], start: &Pose2, window: &SearchWindow) -> Option<Pose2> {
-        let near: Vec<&Point2> = points.iter().filter(|point| point.x.hypot(point.y) <= self.reach_m).collect();
+        let near: Vec<&Point2> =
+            points.iter().filter(|point| point.x.hypot(point.y) <= self.reach_m).collect();
         let farthest_m = near.iter().map(|point| point.x.hypot(point.y)).fold(0.0f64, f64::max);
         if near.is_empty() || farthest_m <= 0.0 {
             return None;

@@ -58,8 +58,11 @@ pub(crate) fn align(
     for iteration in 0..=settings.max_iterations {
         let outlier_m = settings.outlier_at(iteration);
         let (hessian, gradient, num_inliers) = linearize(map, points, &pose, settings, outlier_m);
-        let offset =
-            Vector3::new(pose.x - prior_mean.x, pose.y - prior_mean.y, wrap_angle(pose.theta - prior_mean.theta));
+        let offset = Vector3::new(
+            pose.x - prior_mean.x,
+            pose.y - prior_mean.y,
+            wrap_angle(pose.theta - prior_mean.theta),
+        );
         let information = hessian + prior;
         result = Alignment {
             map_from_points: pose,

@@ -111,7 +111,10 @@ impl OdometryRefiner {
         };
         self.state.travel_mm += (distance_m * 1000.0).round() as u64;
         self.keep(&points, run_from_robot, scan.odom_from_robot);
-        Refined { run_from_robot, keyframe: Some(KeyframeMotion { motion_covariance: covariance.transpose().into() }) }
+        Refined {
+            run_from_robot,
+            keyframe: Some(KeyframeMotion { motion_covariance: covariance.transpose().into() }),
+        }
     }
 
     fn start(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Refined {
@@ -125,7 +128,13 @@ impl OdometryRefiner {
 
     fn points_of(&self, geometry: &ScanGeometry, scan: &Scan) -> Vec<Point2> {
         let config = &self.state.config;
-        thinned_points(geometry, &scan.ranges_m, config.point_spacing_m, config.range_limit_m, config.max_points)
+        thinned_points(
+            geometry,
+            &scan.ranges_m,
+            config.point_spacing_m,
+            config.range_limit_m,
+            config.max_points,
+        )
     }
 
     /// Correlative search around the prediction, then point-to-line steps; none when the fit is poor.
@@ -156,13 +165,15 @@ impl OdometryRefiner {
         }
         let start = self.search(points, predicted)?;
         let second = align(&self.surfaces, points, predicted, &prior, &start, &settings);
-        let best = if second.inlier_share > first.inlier_share + config.min_search_gain { second } else { first };
+        let best =
+            if second.inlier_share > first.inlier_share + config.min_search_gain { second } else { first };
         (best.inlier_share >= config.min_inlier_share).then_some(best)
     }
 
     fn search(&self, points: &[Point2], predicted: &Pose2) -> Option<Pose2> {
         let config = &self.state.config;
-        let mut grid = LikelihoodGrid::around(&predicted.position(), config.search_radius_m, config.search_cell_m);
+        let mut grid =
+            LikelihoodGrid::around(&predicted.position(), config.search_radius_m, config.search_cell_m);
         for scan in &self.state.recent {
             for point in &scan.points_mm {
                 grid.mark(&from_millimetres(*point));
@@ -225,7 +236,8 @@ mod tests {
     fn recording() -> (Vec<Pose2>, Vec<Scan>) {
         let truth = drive(&[(1.5, 1.5), (12.0, 1.5), (12.0, 7.5), (2.0, 7.0)], 0.1);
         let odometry = drifting(&truth, 1.03, 0.02);
-        let scans = truth.iter().zip(&odometry).map(|(at, odom)| sense(&offices(), &laser(), at, odom)).collect();
+        let scans =
+            truth.iter().zip(&odometry).map(|(at, odom)| sense(&offices(), &laser(), at, odom)).collect();
         (truth, scans)
     }
 

@@ -28,7 +28,8 @@ impl Hasher for CellHasher {
     }
 
     fn write_i32(&mut self, value: i32) {
-        self.0 = (self.0.rotate_left(23) ^ u64::from(value.cast_unsigned())).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+        self.0 =
+            (self.0.rotate_left(23) ^ u64::from(value.cast_unsigned())).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     }
 }
 

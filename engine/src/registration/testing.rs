@@ -28,7 +28,12 @@ pub fn polygon(corners: &[(f64, f64)]) -> Vec<Wall> {
 }
 
 /// What the laser sees from `world_from_robot`, while the odometry says `odom_from_robot`.
-pub fn sense(walls: &[Wall], geometry: &ScanGeometry, world_from_robot: &Pose2, odom_from_robot: &Pose2) -> Scan {
+pub fn sense(
+    walls: &[Wall],
+    geometry: &ScanGeometry,
+    world_from_robot: &Pose2,
+    odom_from_robot: &Pose2,
+) -> Scan {
     let world_from_laser = world_from_robot.compose(&geometry.robot_from_laser);
     let ranges_m = (0..geometry.num_ranges)
         .map(|beam| {
@@ -62,7 +67,10 @@ pub fn drive(corners: &[(f64, f64)], step_m: f64) -> Vec<Pose2> {
         if let Some(last) = poses.last().copied() {
             let turn = crate::geometry::wrap_angle(theta - last.theta);
             let num_turns = (turn.abs() / 0.15).ceil() as usize;
-            poses.extend((1..num_turns).map(|k| Pose2::new(last.x, last.y, last.theta + turn * k as f64 / num_turns as f64)));
+            poses.extend(
+                (1..num_turns)
+                    .map(|k| Pose2::new(last.x, last.y, last.theta + turn * k as f64 / num_turns as f64)),
+            );
         }
         let num_steps = (dx.hypot(dy) / step_m).round() as usize;
         poses.extend((0..num_steps).map(|k| {
@@ -78,7 +86,11 @@ pub fn drifting(poses: &[Pose2], stretch: f64, bend_rad_per_m: f64) -> Vec<Pose2
     let mut odometry = vec![Pose2::identity()];
     for pair in poses.windows(2) {
         let step = pair[0].between(&pair[1]);
-        let bent = Pose2::new(step.x * stretch, step.y * stretch, step.theta + bend_rad_per_m * step.x.hypot(step.y));
+        let bent = Pose2::new(
+            step.x * stretch,
+            step.y * stretch,
+            step.theta + bend_rad_per_m * step.x.hypot(step.y),
+        );
         let last = odometry[odometry.len() - 1];
         odometry.push(last.compose(&bent));
     }
