@@ -142,7 +142,8 @@ impl<'a, const W: usize> BlockFlooder<'a, W> {
             let (before, after) = self.reaches.split_at_mut(level);
             for row in rows.clone() {
                 let is_shared = parent_rows.contains(&row);
-                after[0][row] = if is_shared { and(&before[level - 1][row], &self.masks[level][row]) } else { [0; W] };
+                after[0][row] =
+                    if is_shared { and(&before[level - 1][row], &self.masks[level][row]) } else { [0; W] };
             }
             self.settle(level, rows.clone());
             self.descend(level, corner, &group, fills);
@@ -266,7 +267,12 @@ impl<'a, const W: usize> BlockFlooder<'a, W> {
 }
 
 /// Adds to a row what the row `before` and its own cells lead to; returns the row.
-fn grow<const W: usize>(before: &Row<W>, reach: &mut Row<W>, mask: &Row<W>, has_changed: &mut bool) -> Row<W> {
+fn grow<const W: usize>(
+    before: &Row<W>,
+    reach: &mut Row<W>,
+    mask: &Row<W>,
+    has_changed: &mut bool,
+) -> Row<W> {
     let seed = or(reach, &and(before, mask));
     let beside = or(&shifted_left(&seed), &shifted_right(&seed));
     let has_more = (0..W).fold(0, |more, word| more | (beside[word] & mask[word] & !seed[word])) != 0;
@@ -288,7 +294,8 @@ fn first_set(centres: &[u16; BLOCK_SIDE]) -> Option<(usize, usize)> {
 
 fn children(level: usize, (x, y): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
     let (side, child) = (SIDES[level], SIDES[level + 1]);
-    (0..side / child).flat_map(move |row| (0..side / child).map(move |column| (x + column * child, y + row * child)))
+    (0..side / child)
+        .flat_map(move |row| (0..side / child).map(move |column| (x + column * child, y + row * child)))
 }
 
 /// Rows of the intersection of the discs of `side × side` centres, the lower left of which has column `radius`.
@@ -343,7 +350,11 @@ mod tests {
                 CellState::Occupied => {}
             }
             if map.state(x, y) == CellState::Free {
-                queue.extend([(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)].iter().filter(|&&cell| seen.insert(cell)));
+                queue.extend(
+                    [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+                        .iter()
+                        .filter(|&&cell| seen.insert(cell)),
+                );
             }
         }
         Some(Fill { density: (mass / whole) as f32, num_unknown })
@@ -374,14 +385,17 @@ mod tests {
     #[test]
     fn blocks_agree_with_the_literal_flood() {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
-        let cases = [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
+        let cases =
+            [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
         for (h, width, height) in cases {
             for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
                 let map = random_building(&mut rng, width, height);
                 let kernel = KernelRows::new(profile, h);
                 let planes = BitPlanes::new(&map, kernel.radius() + MARGIN);
                 let mut flooder = AnyFlooder::new(&planes, &kernel);
-                for (left, bottom) in (0..width).step_by(16).flat_map(|x| (0..height).step_by(16).map(move |y| (x, y))) {
+                for (left, bottom) in
+                    (0..width).step_by(16).flat_map(|x| (0..height).step_by(16).map(move |y| (x, y)))
+                {
                     let block = flooder.flood_block(left as i64, bottom as i64, 16);
                     for (x, y) in (0..16).flat_map(|x| (0..16).map(move |y| (x, y))) {
                         let cell = ((left + x) as i64, (bottom + y) as i64);
@@ -391,7 +405,10 @@ mod tests {
                         match (block[y][x], literal_fill(&map, cell, profile, h)) {
                             (Some(fast), Some(slow)) => {
                                 assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
-                                assert!((fast.density - slow.density).abs() < 1e-5, "{fast:?} {slow:?} h {h} at {cell:?}");
+                                assert!(
+                                    (fast.density - slow.density).abs() < 1e-5,
+                                    "{fast:?} {slow:?} h {h} at {cell:?}"
+                                );
                             }
                             (fast, slow) => assert_eq!(fast, slow, "h {h} at {cell:?}"),
                         }
