@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::matching::MatchingConfig;
+use crate::retrieval::RetrievalConfig;
 
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -28,6 +29,8 @@ impl ConfigError {
 pub struct EngineConfig {
     /// When stretches of text match.
     pub matching: MatchingConfig,
+    /// How places are retrieved by their density profiles.
+    pub retrieval: RetrievalConfig,
 }
 
 impl EngineConfig {
@@ -36,6 +39,7 @@ impl EngineConfig {
     /// # Errors
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        self.matching.validate("matching")
+        self.matching.validate("matching")?;
+        self.retrieval.validate("retrieval")
     }
 }
