@@ -9,6 +9,7 @@ use crate::matching::MatchingConfig;
 use crate::registration::RegistrationConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
+use crate::retrieval::RetrievalConfig;
 
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -37,6 +38,8 @@ pub struct EngineConfig {
     pub matching: MatchingConfig,
     /// How scans and submaps are registered.
     pub registration: RegistrationConfig,
+    /// How places are retrieved by their density profiles.
+    pub retrieval: RetrievalConfig,
 }
 
 impl EngineConfig {
@@ -47,7 +50,8 @@ impl EngineConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
-        self.registration.validate("registration")
+        self.registration.validate("registration")?;
+        self.retrieval.validate("retrieval")
     }
 }
 
@@ -84,5 +88,7 @@ impl TranslatorConfig {
             return Err(ConfigError::new(format!("{path}.sampling.delay_m"), problem));
         }
         Ok(())
+        self.matching.validate("matching")?;
+        self.retrieval.validate("retrieval")
     }
 }
