@@ -7,9 +7,9 @@ use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
 use crate::matching::MatchingConfig;
 use crate::registration::RegistrationConfig;
+use crate::retrieval::RetrievalConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
-use crate::retrieval::RetrievalConfig;
 
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -88,7 +88,5 @@ impl TranslatorConfig {
             return Err(ConfigError::new(format!("{path}.sampling.delay_m"), problem));
         }
         Ok(())
-        self.matching.validate("matching")?;
-        self.retrieval.validate("retrieval")
     }
 }
