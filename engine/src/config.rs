@@ -6,6 +6,7 @@ use thiserror::Error;
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
 use crate::matching::MatchingConfig;
+use crate::retrieval::RetrievalConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
 
@@ -34,6 +35,8 @@ pub struct EngineConfig {
     pub translator: TranslatorConfig,
     /// When stretches of text match.
     pub matching: MatchingConfig,
+    /// How places are retrieved by their density profiles.
+    pub retrieval: RetrievalConfig,
 }
 
 impl EngineConfig {
@@ -43,7 +46,9 @@ impl EngineConfig {
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.translator.validate("translator")?;
-        self.matching.validate("matching")
+        self.matching.validate("matching")?;
+        self.retrieval.validate("retrieval")?;
+        Ok(())
     }
 }
 
