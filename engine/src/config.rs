@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
+use crate::matching::MatchingConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
 
@@ -31,6 +32,8 @@ impl ConfigError {
 pub struct EngineConfig {
     /// From scans to words; another value here is another text.
     pub translator: TranslatorConfig,
+    /// When stretches of text match.
+    pub matching: MatchingConfig,
 }
 
 impl EngineConfig {
@@ -39,7 +42,8 @@ impl EngineConfig {
     /// # Errors
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
-        self.translator.validate("translator")
+        self.translator.validate("translator")?;
+        self.matching.validate("matching")
     }
 }
 
