@@ -6,9 +6,10 @@ use thiserror::Error;
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
 use crate::matching::MatchingConfig;
-use crate::retrieval::RetrievalConfig;
+use crate::registration::RegistrationConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
+use crate::retrieval::RetrievalConfig;
 
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -35,6 +36,8 @@ pub struct EngineConfig {
     pub translator: TranslatorConfig,
     /// When stretches of text match.
     pub matching: MatchingConfig,
+    /// How scans and submaps are registered.
+    pub registration: RegistrationConfig,
     /// How places are retrieved by their density profiles.
     pub retrieval: RetrievalConfig,
 }
@@ -47,8 +50,8 @@ impl EngineConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
-        self.retrieval.validate("retrieval")?;
-        Ok(())
+        self.registration.validate("registration")?;
+        self.retrieval.validate("retrieval")
     }
 }
 
@@ -85,5 +88,7 @@ impl TranslatorConfig {
             return Err(ConfigError::new(format!("{path}.sampling.delay_m"), problem));
         }
         Ok(())
+        self.matching.validate("matching")?;
+        self.retrieval.validate("retrieval")
     }
 }
