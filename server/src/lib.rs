@@ -1,1 +1,4 @@
-//! The Locution server.
+//! The Locution server: HTTP in front of the engine, with storage underneath.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod storage;
