@@ -1,0 +1,177 @@
+//! Rows of cells as bits: the arithmetic that makes flood fills fast.
+//!
+//! A row of a window is `W` words; bit 0 of word 0 is the leftmost cell. Spreading a seed to the right along a run of
+//! set bits is one addition: in `mask + seed` the carry starts at the seed, clears the run up to its end and falls
+//! into the gap behind it. To the left no carry runs, so six doublings per word do it.
+
+use super::grid_map::{CellState, GridMap};
+
+/// A row of a window.
+pub(super) type Row<const W: usize> = [u64; W];
+
+/// `a & b`.
+pub(super) fn and<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
+    std::array::from_fn(|word| a[word] & b[word])
+}
+
+/// `a | b`.
+pub(super) fn or<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
+    std::array::from_fn(|word| a[word] | b[word])
+}
+
+/// True when no bit is set.
+pub(super) fn is_empty<const W: usize>(a: &Row<W>) -> bool {
+    a.iter().fold(0, |all, word| all | word) == 0
+}
+
+/// Every cell moved one to the right (towards higher bits).
+pub(super) fn shifted_right<const W: usize>(a: &Row<W>) -> Row<W> {
+    std::array::from_fn(|word| (a[word] << 1) | if word > 0 { a[word - 1] >> 63 } else { 0 })
+}
+
+/// Every cell moved one to the left.
+pub(super) fn shifted_left<const W: usize>(a: &Row<W>) -> Row<W> {
+    std::array::from_fn(|word| (a[word] >> 1) | if word + 1 < W { a[word + 1] << 63 } else { 0 })
+}
+
+/// Every cell moved `count < 64` to the right.
+pub(super) fn shifted_by<const W: usize>(a: &Row<W>, count: usize) -> Row<W> {
+    if count == 0 {
+        return *a;
+    }
+    std::array::from_fn(|word| (a[word] << count) | if word > 0 { a[word - 1] >> (64 - count) } else { 0 })
+}
+
+/// True when the bit of a column is set.
+pub(super) fn has<const W: usize>(a: &Row<W>, column: usize) -> bool {
+    a[column / 64] >> (column % 64) & 1 == 1
+}
+
+/// The row whose bits `first..=last` are set; none when `last < first`.
+pub(super) fn span<const W: usize>(first: i64, last: i64) -> Row<W> {
+    std::array::from_fn(|word| {
+        let base = word as i64 * 64;
+        let (low, high) = ((first - base).max(0), (last - base).min(63));
+        if low > high { 0 } else { (u64::MAX >> (63 - high + low)) << low }
+    })
+}
+
+/// All cells of `mask` that hang together with a cell of `seed` along the row; `seed` must lie within `mask`.
+pub(super) fn spread<const W: usize>(seed: &Row<W>, mask: &Row<W>) -> Row<W> {
+    let mut reach = [0; W];
+    let mut carry = false;
+    for word in 0..W {
+        let (sum, first_carry) = mask[word].overflowing_add(seed[word]);
+        let (sum, second_carry) = sum.overflowing_add(u64::from(carry));
+        carry = first_carry | second_carry;
+        reach[word] = (mask[word] & !sum) | seed[word];
+    }
+    let mut from_right = 0;
+    for word in (0..W).rev() {
+        reach[word] = spread_left(reach[word] | (from_right & mask[word]), mask[word]);
+        from_right = reach[word] << 63;
+    }
+    reach
+}
+
+/// Spreads the bits of `seed` to lower bits along the runs of `mask`, by doubling (Kogge and Stone's prefix scheme).
+fn spread_left(seed: u64, mask: u64) -> u64 {
+    let mut reach = seed;
+    let mut passable = mask;
+    let mut step = 1;
+    while step < 64 && (reach >> 1) & mask & !reach != 0 {
+        reach |= passable & (reach >> step);
+        passable &= passable >> step;
+        step *= 2;
+    }
+    reach
+}
+
+/// A map as two planes of bits with a margin all round, so that windows may hang over its edge.
+#[derive(Clone, Debug)]
+pub(super) struct BitPlanes {
+    words_per_row: usize,
+    margin: usize,
+    free: Vec<u64>,
+    unknown: Vec<u64>,
+}
+
+impl BitPlanes {
+    /// The planes of a map with `margin` unknown cells on every side.
+    pub fn new(map: &GridMap, margin: usize) -> Self {
+        let words_per_row = (map.width() + 2 * margin).div_ceil(64) + 5;
+        let num_words = words_per_row * (map.height() + 2 * margin);
+        let mut planes =
+            Self { words_per_row, margin, free: vec![0; num_words], unknown: vec![u64::MAX; num_words] };
+        for (row, states) in map.cells().chunks_exact(map.width()).enumerate() {
+            let start = (row + margin) * words_per_row;
+            for (column, state) in states.iter().enumerate() {
+                let (word, bit) = (start + (column + margin) / 64, 1u64 << ((column + margin) % 64));
+                match state {
+                    CellState::Unknown => continue,
+                    CellState::Free => planes.free[word] |= bit,
+                    CellState::Occupied => {}
+                }
+                planes.unknown[word] &= !bit;
+            }
+        }
+        planes
+    }
+
+    /// `64 W` free bits of a row from a column on; both may be up to the margin outside the map.
+    pub fn free_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
+        self.row(&self.free, column, row)
+    }
+
+    /// The same for unknown cells.
+    pub fn unknown_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
+        self.row(&self.unknown, column, row)
+    }
+
+    fn row<const W: usize>(&self, plane: &[u64], column: i64, row: i64) -> Row<W> {
+        let column = (column + self.margin as i64) as usize;
+        let start = (row + self.margin as i64) as usize * self.words_per_row + column / 64;
+        let (words, shift) = (&plane[start..=start + W], column % 64);
+        std::array::from_fn(|word| match shift {
+            0 => words[word],
+            _ => (words[word] >> shift) | (words[word + 1] << (64 - shift)),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn spread_by_steps(seed: &Row<3>, mask: &Row<3>) -> Row<3> {
+        let mut reach = *seed;
+        loop {
+            let next = or(&reach, &and(&or(&shifted_left(&reach), &shifted_right(&reach)), mask));
+            if next == reach {
+                return reach;
+            }
+            reach = next;
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn spreading_equals_stepping(seed: [u64; 3], holes: [u64; 3], more_holes: [u64; 3]) {
+            let mask: Row<3> = std::array::from_fn(|word| !(holes[word] & more_holes[word]));
+            let seed = and(&std::array::from_fn(|word| seed[word] & holes[word]), &mask);
+            prop_assert_eq!(spread(&seed, &mask), spread_by_steps(&seed, &mask));
+            let sparse = [mask[0], u64::MAX, mask[2]];
+            let seed = and(&seed, &sparse);
+            prop_assert_eq!(spread(&seed, &sparse), spread_by_steps(&seed, &sparse));
+        }
+
+        #[test]
+        fn spans_hold_their_columns(first in -5i64..140, last in -5i64..140) {
+            let row: Row<2> = span(first, last);
+            for column in 0..128 {
+                prop_assert_eq!(has(&row, column as usize), column >= first && column <= last);
+            }
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! The map a robot is looked for in: free, occupied and unknown cells.
+
+use serde::{Deserialize, Serialize};
+
+use crate::geometry::Point2;
+
+/// What is known of a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CellState {
+    /// Never seen, or seen both ways.
+    #[default]
+    Unknown,
+    /// Nothing stands there.
+    Free,
+    /// Something stands there.
+    Occupied,
+}
+
+/// An occupancy grid, axis-parallel; rows run along y from the lower left corner, as `nav_msgs/OccupancyGrid` has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GridMap {
+    width: usize,
+    height: usize,
+    resolution_m: f64,
+    origin: Point2,
+    cells: Vec<CellState>,
+}
+
+impl GridMap {
+    /// A map of `width` columns; None when the cells do not fill whole rows, the map is empty or the resolution is
+    /// not a positive number.
+    pub fn new(width: usize, resolution_m: f64, origin: Point2, cells: Vec<CellState>) -> Option<Self> {
+        let is_whole = width > 0 && !cells.is_empty() && cells.len().is_multiple_of(width);
+        let is_usable =
+            resolution_m.is_finite() && resolution_m > 0.0 && origin.x.is_finite() && origin.y.is_finite();
+        (is_whole && is_usable).then(|| Self {
+            width,
+            height: cells.len() / width,
+            resolution_m,
+            origin,
+            cells,
+        })
+    }
+
+    /// A map of `width × height` unknown cells; sides of zero become one.
+    pub fn unknown(width: usize, height: usize, resolution_m: f64, origin: Point2) -> Self {
+        let (width, height) = (width.max(1), height.max(1));
+        Self { width, height, resolution_m, origin, cells: vec![CellState::Unknown; width * height] }
+    }
+
+    /// Columns.
+    pub const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub const fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Edge of a cell in metres.
+    pub const fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    /// Lower left corner of the lower left cell, metres.
+    pub const fn origin(&self) -> Point2 {
+        self.origin
+    }
+
+    /// All cells, row by row from the lower left.
+    pub fn cells(&self) -> &[CellState] {
+        &self.cells
+    }
+
+    /// State of a cell; whatever lies outside is unknown.
+    pub fn state(&self, column: i64, row: i64) -> CellState {
+        match self.index(column, row) {
+            Some(index) => self.cells[index],
+            None => CellState::Unknown,
+        }
+    }
+
+    /// Says what is known of a cell; cells outside are ignored.
+    pub fn set(&mut self, column: i64, row: i64, state: CellState) {
+        if let Some(index) = self.index(column, row) {
+            self.cells[index] = state;
+        }
+    }
+
+    /// Column and row of the cell that holds a point, which may lie outside the map.
+    pub fn cell_at(&self, point: &Point2) -> (i64, i64) {
+        let column = ((point.x - self.origin.x) / self.resolution_m).floor();
+        let row = ((point.y - self.origin.y) / self.resolution_m).floor();
+        (column as i64, row as i64)
+    }
+
+    /// Centre of a cell, metres.
+    pub fn center_of(&self, column: i64, row: i64) -> Point2 {
+        Point2::new(
+            self.origin.x + (column as f64 + 0.5) * self.resolution_m,
+            self.origin.y + (row as f64 + 0.5) * self.resolution_m,
+        )
+    }
+
+    /// Number of free cells.
+    pub fn num_free(&self) -> usize {
+        self.cells.iter().filter(|&&state| state == CellState::Free).count()
+    }
+
+    fn index(&self, column: i64, row: i64) -> Option<usize> {
+        let is_inside = column >= 0 && row >= 0 && column < self.width as i64 && row < self.height as i64;
+        is_inside.then(|| row as usize * self.width + column as usize)
+    }
+}
+
+#[cfg(test)]
+impl GridMap {
+    /// A map drawn as text, top row first: `.` free, `#` occupied, anything else unknown.
+    pub(crate) fn drawn(rows: &[&str], resolution_m: f64) -> Self {
+        let mut map = Self::unknown(rows[0].chars().count(), rows.len(), resolution_m, Point2::default());
+        for (from_top, row) in rows.iter().enumerate() {
+            for (column, symbol) in row.chars().enumerate() {
+                let state = match symbol {
+                    '.' => CellState::Free,
+                    '#' => CellState::Occupied,
+                    _ => CellState::Unknown,
+                };
+                map.set(column as i64, (rows.len() - 1 - from_top) as i64, state);
+            }
+        }
+        map
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_and_points_agree() {
+        let map = GridMap::unknown(4, 3, 0.5, Point2::new(-1.0, 2.0));
+        assert_eq!(map.cell_at(&Point2::new(-0.9, 2.1)), (0, 0));
+        assert_eq!(map.cell_at(&Point2::new(-1.1, 2.6)), (-1, 1));
+        assert_eq!(map.cell_at(&map.center_of(3, 2)), (3, 2));
+        assert_eq!(map.state(-1, 1), CellState::Unknown);
+    }
+
+    #[test]
+    fn drawings_have_their_last_row_at_the_bottom() {
+        let map = GridMap::drawn(&["..", "#?"], 1.0);
+        assert_eq!(map.state(0, 0), CellState::Occupied);
+        assert_eq!(map.state(1, 0), CellState::Unknown);
+        assert_eq!(map.num_free(), 2);
+    }
+
+    #[test]
+    fn ragged_cells_are_refused() {
+        assert!(GridMap::new(3, 0.1, Point2::default(), vec![CellState::Free; 7]).is_none());
+        assert!(GridMap::new(3, 0.0, Point2::default(), vec![CellState::Free; 6]).is_none());
+        assert!(GridMap::new(3, 0.1, Point2::default(), vec![CellState::Free; 6]).is_some());
+    }
+}
