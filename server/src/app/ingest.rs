@@ -104,7 +104,8 @@ impl App {
     ) -> Result<Receipt, AppError> {
         let num_scans_max = self.config().limits.num_scans_per_batch_max;
         if batch.scans.len() > num_scans_max {
-            let problem = format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
+            let problem =
+                format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
             return Err(AppError::invalid("scans", problem));
         }
         let geometry = &writer.run.geometry;
@@ -138,8 +139,10 @@ fn check_readings(scans: &mut [Scan], geometry: &ScanGeometry) -> Result<(), App
     for (scan_idx, scan) in scans.iter_mut().enumerate() {
         let num_ranges = scan.ranges_m.len();
         if num_ranges != geometry.num_ranges {
-            let problem =
-                format!("scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}", geometry.num_ranges);
+            let problem = format!(
+                "scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}",
+                geometry.num_ranges
+            );
             return Err(AppError::invalid_scan(format!("scans[{scan_idx}].ranges_m"), problem));
         }
         for range_m in &mut scan.ranges_m {

@@ -136,7 +136,8 @@ impl RunWriter {
         let parts = reader.multi_get(&(0..text.num_checkpoint_parts).map(key).collect::<Vec<_>>()).await?;
         let mut bytes = Vec::new();
         for part in parts {
-            let missing = || StorageError::Corrupt { what: "a part of a stored translator is missing".into() };
+            let missing =
+                || StorageError::Corrupt { what: "a part of a stored translator is missing".into() };
             bytes.extend(codec::decode::<Vec<u8>>(&part.ok_or_else(missing)?, "a stored translator")?);
         }
         RunTranslator::restore(config, &self.run.geometry, &bytes)
@@ -155,7 +156,8 @@ impl WriterState {
         let observations = &translated.observations;
         series::append(batch, observations, text.num_observations, |n| Key::Observations(generation, run, n));
         text.num_observations += observations.len() as u64;
-        let num_levels = translated.words.iter().map(|word| usize::from(word.id.level) + 1).max().unwrap_or(0);
+        let num_levels =
+            translated.words.iter().map(|word| usize::from(word.id.level) + 1).max().unwrap_or(0);
         text.num_words.resize(num_levels.max(text.num_words.len()), 0);
         for level in 0..num_levels {
             let words: Vec<_> =
@@ -192,7 +194,10 @@ impl WriterState {
         let bytes = translator.ok_or_else(|| AppError::internal("no translator to store"))?.store()?;
         let mut num_parts = 0u32;
         for part in bytes.chunks(CHECKPOINT_PART_BYTES) {
-            batch.put(Key::Checkpoint(self.generation, run, num_parts).encode(), codec::encode(&part.to_vec()));
+            batch.put(
+                Key::Checkpoint(self.generation, run, num_parts).encode(),
+                codec::encode(&part.to_vec()),
+            );
             num_parts += 1;
         }
         for stale in num_parts..text.num_checkpoint_parts {

@@ -56,7 +56,10 @@ impl App {
         let run = StoredRun { name: name.to_string(), robot: new.robot, geometry: new.geometry };
         let create = |record: &mut super::records::SiteRecord, batch: &mut crate::storage::Batch| {
             if record.num_runs >= num_runs_max {
-                return Err(AppError::invalid("run", format!("the site holds {num_runs_max} runs, its limit")));
+                return Err(AppError::invalid(
+                    "run",
+                    format!("the site holds {num_runs_max} runs, its limit"),
+                ));
             }
             let idx = record.num_runs;
             record.num_runs += 1;
@@ -106,7 +109,8 @@ impl Site {
     /// # Errors
     /// Those of the storage.
     pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<Vec<RunInfo>, AppError> {
-        let end = self.state().record.num_runs.min(from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX)));
+        let end =
+            self.state().record.num_runs.min(from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX)));
         let mut runs = Vec::new();
         for idx in from..end {
             runs.push(read_run(&**self.store(), self.generation(), idx).await?);
@@ -118,7 +122,11 @@ impl Site {
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub(super) async fn writer(&self, name: &Name, num_batches_max: usize) -> Result<Arc<RunWriter>, AppError> {
+    pub(super) async fn writer(
+        &self,
+        name: &Name,
+        num_batches_max: usize,
+    ) -> Result<Arc<RunWriter>, AppError> {
         if let Some(writer) = self.writers.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
             return Ok(Arc::clone(writer));
         }

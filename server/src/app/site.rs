@@ -36,8 +36,9 @@ pub struct SiteState {
 impl SiteState {
     fn decode(bytes: Bytes) -> Result<Self, StorageError> {
         let record: SiteRecord = codec::decode(&bytes, "the record of the site")?;
-        let config = serde_json::from_str(&record.config_json)
-            .map_err(|error| StorageError::Corrupt { what: format!("the configuration of the site: {error}") })?;
+        let config = serde_json::from_str(&record.config_json).map_err(|error| StorageError::Corrupt {
+            what: format!("the configuration of the site: {error}"),
+        })?;
         Ok(Self { record, config: Arc::new(config), bytes })
     }
 }
@@ -156,7 +157,9 @@ impl App {
                 }
                 Ok((site, false))
             }
-            Err(AppError::NotFound { .. }) => Ok((self.create_site(name, config.unwrap_or_default()).await?, true)),
+            Err(AppError::NotFound { .. }) => {
+                Ok((self.create_site(name, config.unwrap_or_default()).await?, true))
+            }
             Err(error) => Err(error),
         }
     }

@@ -6,11 +6,11 @@
 
 use locution_engine::geometry::{Pose2, wrap_angle};
 
+use super::AppError;
 use super::reading::read_stored_keyframes;
 use super::runs::RunInfo;
 use super::scans::read_stamps;
 use super::site::Site;
-use super::AppError;
 
 /// In whose coordinates poses are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -30,7 +30,11 @@ impl RunTranslator {
     }
 
     /// The translator as it was stored.
-    pub fn restore(_config: &Arc<EngineConfig>, _geometry: &ScanGeometry, _bytes: &[u8]) -> Result<Self, AppError> {
+    pub fn restore(
+        _config: &Arc<EngineConfig>,
+        _geometry: &ScanGeometry,
+        _bytes: &[u8],
+    ) -> Result<Self, AppError> {
         Ok(Self {})
     }
 
