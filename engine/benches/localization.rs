@@ -6,8 +6,8 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use locution_engine::geometry::{Point2, Pose2};
 use locution_engine::localization::{
-    CellState, DensityField, DensityFieldConfig, DensityModel, DensityModelConfig, GridMap, LikelihoodFieldConfig,
-    LikelihoodFieldModel, ParticleFilter, ParticleFilterConfig, ServedMap, observe,
+    CellState, DensityField, DensityFieldConfig, DensityModel, DensityModelConfig, GridMap,
+    LikelihoodFieldConfig, LikelihoodFieldModel, ParticleFilter, ParticleFilterConfig, ServedMap, observe,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -29,7 +29,9 @@ fn office() -> GridMap {
         let mut left = 2;
         while left + 72 < SIDE - 2 {
             let right = left + rng.random_range(40..70);
-            for (low, high, door) in [(bottom + 26, bottom + 83, bottom + 24), (bottom + 85, bottom + 142, bottom + 142)] {
+            for (low, high, door) in
+                [(bottom + 26, bottom + 83, bottom + 24), (bottom + 85, bottom + 142, bottom + 142)]
+            {
                 fill(&mut map, left..right, low..high, CellState::Free);
                 let at = rng.random_range(left..right - 10);
                 fill(&mut map, at..at + 10, door..door + 2, CellState::Free);
@@ -66,7 +68,8 @@ fn update_particles(criterion: &mut Criterion) {
         let seen = observe(&map, &robot, &config);
         let sensor = DensityModel::new(&served.density, &seen, &DensityModelConfig::default());
         let spread = ParticleFilter::global(&served, ParticleFilterConfig::default(), 7);
-        let gathered = ParticleFilter::around(&served, &[robot], (0.5, 0.2), ParticleFilterConfig::default(), 7);
+        let gathered =
+            ParticleFilter::around(&served, &[robot], (0.5, 0.2), ParticleFilterConfig::default(), 7);
         for (name, start) in [("spread", spread), ("gathered", gathered)] {
             let mut filter = start.clone();
             group.bench_function(format!("densities, {num_kernels} kernels, {name}"), |bencher| {
@@ -87,13 +90,15 @@ fn track(criterion: &mut Criterion) {
     for num_beams in [30, 60] {
         let points: Vec<Point2> = (0..num_beams)
             .map(|beam| {
-                let (angle, range) = (f64::from(beam) * 3.14 / f64::from(num_beams) - 1.57, 1.0 + f64::from(beam % 7));
+                let (angle, range) =
+                    (f64::from(beam) * 3.14 / f64::from(num_beams) - 1.57, 1.0 + f64::from(beam % 7));
                 Point2::new(range * angle.cos(), range * angle.sin())
             })
             .collect();
         let sensor = LikelihoodFieldModel::new(&served.likelihood, &points);
         let spread = ParticleFilter::global(&served, ParticleFilterConfig::default(), 7);
-        let gathered = ParticleFilter::around(&served, &[robot], (0.5, 0.2), ParticleFilterConfig::default(), 7);
+        let gathered =
+            ParticleFilter::around(&served, &[robot], (0.5, 0.2), ParticleFilterConfig::default(), 7);
         for (name, start) in [("spread", spread), ("gathered", gathered)] {
             group.bench_function(format!("likelihood field, {num_beams} beams, {name}"), |bencher| {
                 bencher.iter_batched_ref(

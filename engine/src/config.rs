@@ -3,6 +3,14 @@
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::density::DensityConfig;
+use crate::grid::LocalMapConfig;
+use crate::matching::MatchingConfig;
+use crate::registration::RegistrationConfig;
+use crate::sampling::SamplingConfig;
+use crate::text::{QuantizerConfig, TextConfig};
+use crate::retrieval::RetrievalConfig;
+
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error("{field}: {problem}")]
@@ -23,7 +31,16 @@ impl ConfigError {
 /// Everything the engine can be told, per site; stored with every text it produced.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct EngineConfig {}
+pub struct EngineConfig {
+    /// From scans to words; another value here is another text.
+    pub translator: TranslatorConfig,
+    /// When stretches of text match.
+    pub matching: MatchingConfig,
+    /// How scans and submaps are registered.
+    pub registration: RegistrationConfig,
+    /// How places are retrieved by their density profiles.
+    pub retrieval: RetrievalConfig,
+}
 
 impl EngineConfig {
     /// Checks every value.
@@ -31,6 +48,45 @@ impl EngineConfig {
     /// # Errors
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
+        self.translator.validate("translator")?;
+        self.matching.validate("matching")?;
+        self.registration.validate("registration")?;
+        self.retrieval.validate("retrieval")
+    }
+}
+
+/// All that decides how scans become a text (SPEC section 3).
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TranslatorConfig {
+    /// The rolling occupancy grid.
+    pub local_map: LocalMapConfig,
+    /// Kernels of the density.
+    pub density: DensityConfig,
+    /// When observations and keyframes are taken.
+    pub sampling: SamplingConfig,
+    /// How densities become classes.
+    pub quantizer: QuantizerConfig,
+    /// How classes become words.
+    pub text: TextConfig,
+}
+
+impl TranslatorConfig {
+    /// Checks every value; `path` is the name of this part in the whole configuration.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        self.local_map.validate(&format!("{path}.local_map"))?;
+        self.density.validate(&format!("{path}.density"))?;
+        self.sampling.validate(&format!("{path}.sampling"))?;
+        self.quantizer.validate(&format!("{path}.quantizer"))?;
+        self.text.validate(&format!("{path}.text"))?;
+        // A delayed observation looks back over the delay; its widest kernel must still lie within the map.
+        if self.sampling.delay_m + self.density.widest_m() > self.local_map.radius_m {
+            let problem = "plus the widest kernel's bandwidth must not exceed local_map.radius_m";
+            return Err(ConfigError::new(format!("{path}.sampling.delay_m"), problem));
+        }
         Ok(())
     }
 }

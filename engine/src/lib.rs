@@ -5,9 +5,11 @@
 //! randomness. The same input gives the same bytes. Units are metres, radians and seconds throughout.
 //!
 //! Read the rooms in the order of the data flow:
-//! [`scan`] → [`grid`] → [`density`] → [`text`] → [`index`] → [`matching`], [`retrieval`] → [`registration`] →
+//! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] → [`matching`], [`retrieval`] → [`registration`] →
 //! [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
 //! [`simulation`] and [`evaluation`], which feed and judge it.
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod config;
 pub mod density;
@@ -22,7 +24,9 @@ pub mod matching;
 pub mod pose_graph;
 pub mod registration;
 pub mod retrieval;
+pub mod sampling;
 pub mod scan;
 pub mod semantics;
 pub mod simulation;
 pub mod text;
+pub mod translator;

@@ -125,7 +125,9 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
                 }
                 is_leaving = true;
                 if self.is_free(row, column + 1) {
-                    if last_free.is_some_and(|last| last.abs_diff(row) > 1 && !self.is_bridged(last, row, column + 1)) {
+                    if last_free
+                        .is_some_and(|last| last.abs_diff(row) > 1 && !self.is_bridged(last, row, column + 1))
+                    {
                         return false;
                     }
                     last_free = Some(row);
@@ -191,7 +193,10 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             let column = centre - self.half_chords[row];
             let beside = [(row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
             for (row, column) in beside {
-                if row < self.half_chords.len() && self.is_touched(row, column) && !self.touches_reach(row, column) {
+                if row < self.half_chords.len()
+                    && self.is_touched(row, column)
+                    && !self.touches_reach(row, column)
+                {
                     let (word, bit) = self.place(row, column);
                     self.touched[word] &= !bit;
                     self.num_touched -= 1;
@@ -206,7 +211,8 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         for row in 0..=last_row {
             let column = centre + self.half_chords[row];
             let (word, bit) = self.place(row, column);
-            if self.planes.free_word(self.bottom + row, column) & bit != 0 && self.is_reached(row, column - 1) {
+            if self.planes.free_word(self.bottom + row, column) & bit != 0 && self.is_reached(row, column - 1)
+            {
                 self.reach[word] |= bit;
                 self.num_reached += 1;
             }
@@ -225,7 +231,9 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     fn enter_free(&mut self, row: usize, column: usize, centre: usize) {
         let above_and_below = [row.wrapping_sub(1), row + 1];
         if !self.is_reached(row, column) {
-            let hangs_on = above_and_below.iter().any(|&other| other < self.half_chords.len() && self.is_reached(other, column));
+            let hangs_on = above_and_below
+                .iter()
+                .any(|&other| other < self.half_chords.len() && self.is_reached(other, column));
             if !hangs_on {
                 return;
             }
@@ -238,7 +246,8 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
                 && !sweep.is_touched(row, column)
                 && !sweep.planes.is_occupied(sweep.bottom + row, column)
         };
-        let is_open = leads_on(self, row, column - 1) || above_and_below.iter().any(|&other| leads_on(self, other, column));
+        let is_open = leads_on(self, row, column - 1)
+            || above_and_below.iter().any(|&other| leads_on(self, other, column));
         if is_open {
             self.stack.push((row, column));
             self.flood_on(centre);
@@ -248,9 +257,13 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     /// Spreads from the cells on the stack, cell by cell.
     fn flood_on(&mut self, centre: usize) {
         while let Some((row, column)) = self.stack.pop() {
-            let around = [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
+            let around =
+                [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
             for (row, column) in around {
-                if row >= self.half_chords.len() || !self.is_inside(row, column, centre) || self.is_reached(row, column) {
+                if row >= self.half_chords.len()
+                    || !self.is_inside(row, column, centre)
+                    || self.is_reached(row, column)
+                {
                     continue;
                 }
                 if self.is_free(row, column) {
@@ -279,7 +292,8 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         let mut before = [0; W];
         for row in 0..num_rows {
             let after = reach.get(row + 1).copied().unwrap_or([0; W]);
-            let beside = or(&or(&before, &after), &or(&shifted_left(&reach[row]), &shifted_right(&reach[row])));
+            let beside =
+                or(&or(&before, &after), &or(&shifted_left(&reach[row]), &shifted_right(&reach[row])));
             let unknown = and(&self.planes.unknown_row(self.bottom + row, left), &self.disc_row(row));
             let touched = and(&beside, &unknown);
             let start = row * self.planes.words_per_row();
@@ -394,7 +408,12 @@ fn settle<const W: usize>(reach: &mut [Row<W>], masks: &[Row<W>], middle: usize)
 }
 
 /// Adds to a row what the row `before` leads to; returns the row.
-fn grow<const W: usize>(before: &Row<W>, reach: &mut Row<W>, mask: &Row<W>, has_changed: &mut bool) -> Row<W> {
+fn grow<const W: usize>(
+    before: &Row<W>,
+    reach: &mut Row<W>,
+    mask: &Row<W>,
+    has_changed: &mut bool,
+) -> Row<W> {
     let seed = or(reach, &and(before, mask));
     if seed != *reach {
         *reach = spread(&seed, mask);
@@ -464,7 +483,11 @@ mod tests {
                 CellState::Occupied => {}
             }
             if map.state(x, y) == CellState::Free {
-                queue.extend([(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)].iter().filter(|&&cell| seen.insert(cell)));
+                queue.extend(
+                    [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
+                        .iter()
+                        .filter(|&&cell| seen.insert(cell)),
+                );
             }
         }
         Some(Fill { density: (mass / whole) as f32, num_unknown })
@@ -507,7 +530,8 @@ mod tests {
     #[test]
     fn sliding_discs_agree_with_the_literal_flood() {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
-        let cases = [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
+        let cases =
+            [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
         for (h, width, height) in cases {
             for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
                 let map = random_building(&mut rng, width, height);
@@ -522,7 +546,10 @@ mod tests {
                     match (fast, literal_fill(&map, cell, profile, h)) {
                         (Some(fast), Some(slow)) => {
                             assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
-                            assert!((fast.density - slow.density).abs() < 1e-5, "{fast:?} {slow:?} h {h} at {cell:?}");
+                            assert!(
+                                (fast.density - slow.density).abs() < 1e-5,
+                                "{fast:?} {slow:?} h {h} at {cell:?}"
+                            );
                         }
                         (fast, slow) => assert_eq!(*fast, slow, "h {h} at {cell:?}"),
                     }

@@ -65,7 +65,10 @@ impl DensityFieldConfig {
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
         let kernels = &self.bandwidths_m;
-        if kernels.is_empty() || kernels.len() > MAX_KERNELS || !kernels.iter().all(|h| *h > 0.0 && *h <= 10.0) {
+        if kernels.is_empty()
+            || kernels.len() > MAX_KERNELS
+            || !kernels.iter().all(|h| *h > 0.0 && *h <= 10.0)
+        {
             let problem = "one to four bandwidths above 0 and up to 10 m are needed";
             return Err(ConfigError::new(format!("{path}.bandwidths_m"), problem));
         }
@@ -260,7 +263,12 @@ fn hard_densities(map: &GridMap, config: &DensityFieldConfig, bandwidth_cells: f
 const ROWS_PER_TASK: usize = 16;
 
 /// Fills of a rectangle of centres, row by row.
-fn sweep(planes: &BitPlanes, kernel: &KernelRows, corner: (i64, i64), size: (usize, usize)) -> Vec<Option<Fill>> {
+fn sweep(
+    planes: &BitPlanes,
+    kernel: &KernelRows,
+    corner: (i64, i64),
+    size: (usize, usize),
+) -> Vec<Option<Fill>> {
     match 2 * kernel.radius() + 1 {
         0..=64 => sweep_by::<1>(planes, kernel, corner, size),
         65..=128 => sweep_by::<2>(planes, kernel, corner, size),
@@ -298,7 +306,11 @@ impl DensityFieldConfig {
 ///
 /// The same floods as for the map, for the 5 × 5 cells that the gradient needs. No density where the robot's cell is
 /// not free.
-pub fn observe(local_map: &GridMap, local_from_robot: &Pose2, config: &DensityFieldConfig) -> Vec<KernelReading> {
+pub fn observe(
+    local_map: &GridMap,
+    local_from_robot: &Pose2,
+    config: &DensityFieldConfig,
+) -> Vec<KernelReading> {
     let (column, row) = local_map.cell_at(&local_from_robot.position());
     let to_robot = |angle: f32| wrap_angle(f64::from(angle) - local_from_robot.theta) as f32;
     let is_inside = local_map.state(column, row) == CellState::Free;
@@ -314,7 +326,10 @@ pub fn observe(local_map: &GridMap, local_from_robot: &Pose2, config: &DensityFi
             let centre = densities.len() / 2;
             let descent_rad = stable_descent(&densities, AROUND, &config.gradient)[centre];
             let density = densities[centre];
-            KernelReading { density: density.is_finite().then_some(density), descent_rad: descent_rad.map(to_robot) }
+            KernelReading {
+                density: density.is_finite().then_some(density),
+                descent_rad: descent_rad.map(to_robot),
+            }
         })
         .collect()
 }
@@ -322,7 +337,12 @@ pub fn observe(local_map: &GridMap, local_from_robot: &Pose2, config: &DensityFi
 /// Cells per side that a stable gradient looks at.
 const AROUND: usize = 5;
 
-fn densities_around(map: &GridMap, config: &DensityFieldConfig, bandwidth_cells: f64, cell: (i64, i64)) -> Vec<f32> {
+fn densities_around(
+    map: &GridMap,
+    config: &DensityFieldConfig,
+    bandwidth_cells: f64,
+    cell: (i64, i64),
+) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
     let planes = BitPlanes::new(map, kernel.radius() + MARGIN);
     let half = AROUND as i64 / 2;

@@ -30,7 +30,10 @@ impl GradientConfig {
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
         if !(self.min_slope_per_cell >= 0.0 && self.min_slope_per_cell.is_finite()) {
-            return Err(ConfigError::new(format!("{path}.min_slope_per_cell"), "must be finite and not negative"));
+            return Err(ConfigError::new(
+                format!("{path}.min_slope_per_cell"),
+                "must be finite and not negative",
+            ));
         }
         if !(0.0..=std::f64::consts::PI).contains(&self.max_turn_rad) {
             return Err(ConfigError::new(format!("{path}.max_turn_rad"), "must lie in 0..=π"));
@@ -44,7 +47,8 @@ impl GradientConfig {
 /// `densities` are rows of `width` cells, NaN where there is no density. The Sobel operator needs the eight
 /// neighbours, and stability the gradients of those, so a direction exists only where 5 × 5 cells have a density.
 pub(super) fn stable_descent(densities: &[f32], width: usize, config: &GradientConfig) -> Vec<Option<f32>> {
-    let slopes: Vec<Slope> = (0..densities.len()).into_par_iter().map(|cell| sobel(densities, width, cell)).collect();
+    let slopes: Vec<Slope> =
+        (0..densities.len()).into_par_iter().map(|cell| sobel(densities, width, cell)).collect();
     let height = densities.len() / width;
     let min_steepness = config.min_slope_per_cell as f32;
     let min_cosine = config.max_turn_rad.cos() as f32;
@@ -78,7 +82,8 @@ fn sobel(densities: &[f32], width: usize, cell: usize) -> Slope {
         return Slope { uphill: [f32::NAN; 2], steepness: f32::NAN };
     }
     let [bl, b, br, l, r, tl, t, tr] = neighbours(cell, width).map(|other| densities[other]);
-    let (gx, gy) = ((tr + 2.0 * r + br - tl - 2.0 * l - bl) / 8.0, (tl + 2.0 * t + tr - bl - 2.0 * b - br) / 8.0);
+    let (gx, gy) =
+        ((tr + 2.0 * r + br - tl - 2.0 * l - bl) / 8.0, (tl + 2.0 * t + tr - bl - 2.0 * b - br) / 8.0);
     let steepness = (gx * gx + gy * gy).sqrt();
     Slope { uphill: [gx / steepness, gy / steepness], steepness }
 }
@@ -104,7 +109,8 @@ mod tests {
 
     #[test]
     fn a_slope_falls_where_it_falls() {
-        let descents = stable_descent(&field(7, 6, |x, y| 0.5 - 0.01 * x + 0.02 * y), 7, &GradientConfig::default());
+        let descents =
+            stable_descent(&field(7, 6, |x, y| 0.5 - 0.01 * x + 0.02 * y), 7, &GradientConfig::default());
         let expected = (-0.02f32).atan2(0.01);
         for row in 2..4 {
             for column in 2..5 {

@@ -32,8 +32,15 @@ impl GridMap {
     /// not a positive number.
     pub fn new(width: usize, resolution_m: f64, origin: Point2, cells: Vec<CellState>) -> Option<Self> {
         let is_whole = width > 0 && !cells.is_empty() && cells.len().is_multiple_of(width);
-        let is_usable = resolution_m.is_finite() && resolution_m > 0.0 && origin.x.is_finite() && origin.y.is_finite();
-        (is_whole && is_usable).then(|| Self { width, height: cells.len() / width, resolution_m, origin, cells })
+        let is_usable =
+            resolution_m.is_finite() && resolution_m > 0.0 && origin.x.is_finite() && origin.y.is_finite();
+        (is_whole && is_usable).then(|| Self {
+            width,
+            height: cells.len() / width,
+            resolution_m,
+            origin,
+            cells,
+        })
     }
 
     /// A map of `width × height` unknown cells; sides of zero become one.

@@ -62,7 +62,13 @@ impl KernelRows {
                 std::iter::once(0.0).chain(sums).collect()
             })
             .collect();
-        Self { radius, half_chords, running, is_uniform: profile == KernelProfile::Uniform, cell_mass: 1.0 / sum }
+        Self {
+            radius,
+            half_chords,
+            running,
+            is_uniform: profile == KernelProfile::Uniform,
+            cell_mass: 1.0 / sum,
+        }
     }
 
     /// Largest column distance that the disc reaches.

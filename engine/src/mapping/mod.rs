@@ -3,7 +3,7 @@
 mod place_match;
 mod run;
 
-pub use place_match::{
-    Channel, Decision, Direction, Evidence, Interval, MatchState, PlaceMatch, Registration, RejectionReason,
-};
+pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
 pub use run::{Keyframe, RunRecord};
+
+pub use crate::text::{Direction, Interval};

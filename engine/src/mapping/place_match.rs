@@ -3,27 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose2;
-
-/// A stretch of one run, by its observations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Interval {
-    /// Position of the run in the list given to the map builder.
-    pub run_idx: u32,
-    /// First observation, inclusive.
-    pub first: u32,
-    /// Last observation, inclusive.
-    pub last: u32,
-}
-
-/// Whether the place was driven the same way both times.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Direction {
-    /// First observation of one interval pairs with the first of the other.
-    Same,
-    /// First pairs with last.
-    Opposite,
-}
+use crate::text::{Direction, Interval};
 
 /// Which way of looking found the candidate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

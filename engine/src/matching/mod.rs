@@ -1,1 +1,15 @@
 //! Chains of matching words and what they are worth (thesis 4.2.3, 5.2.3, 5.2.4).
+
+mod alignment;
+mod chain;
+mod claim;
+mod config;
+mod rows;
+
+#[cfg(test)]
+mod chain_tests;
+
+pub use alignment::{Alignment, align_words};
+pub use chain::{Chain, ChainFinder, Relation, find_chains};
+pub use claim::{ObservationPair, aligned_nodes, chain_stretches, claimed_pairs};
+pub use config::MatchingConfig;

@@ -1,0 +1,101 @@
+//! Kernels on the grid, normalised by their own discrete sums (thesis Eqs 2.14 to 2.16, SPEC 3.3).
+//!
+//! Weights are integers whose sum is about 2³¹, so that sums are exact in any order, and a run of cells in a row is
+//! the difference of two prefix sums.
+
+use super::bit_row::BitRow;
+use super::config::{KernelConfig, KernelProfile};
+use crate::grid::in_cells;
+
+/// What the weights of a kernel add up to, but for rounding.
+const TOTAL: f64 = (1u32 << 31) as f64;
+
+/// A kernel as weights of cells around its centre.
+#[derive(Clone, Debug)]
+pub(super) struct Kernel {
+    /// Bandwidth in cells.
+    pub bandwidth: f64,
+    /// Columns left and right of the centre within the support, by distance from the centre's row.
+    pub half_widths: Vec<i32>,
+    /// For each row distance, sums of the weights of all cells left of a column, from the row's first.
+    prefix_sums: Vec<Vec<u32>>,
+    total: u64,
+}
+
+impl Kernel {
+    /// The kernel on cells of `resolution_m`.
+    pub fn new(config: &KernelConfig, resolution_m: f64) -> Self {
+        let bandwidth = in_cells(config.bandwidth_m, resolution_m);
+        let half_widths = half_widths(bandwidth);
+        let weights: Vec<Vec<f64>> = half_widths
+            .iter()
+            .zip(0i32..)
+            .map(|(&half, dy)| {
+                (-half..=half)
+                    .map(|dx| weight(config.profile, f64::from(dx).hypot(f64::from(dy)), bandwidth))
+                    .collect()
+            })
+            .collect();
+        let mirrored = |row: usize| if row == 0 { 1.0 } else { 2.0 };
+        let sum: f64 = weights
+            .iter()
+            .enumerate()
+            .map(|(row, row_weights)| mirrored(row) * row_weights.iter().sum::<f64>())
+            .sum();
+        let prefix_sums: Vec<Vec<u32>> = weights
+            .iter()
+            .map(|row| {
+                let scaled = row.iter().map(|weight| (weight / sum * TOTAL).round() as u32);
+                std::iter::once(0)
+                    .chain(scaled.scan(0u32, |left, weight| {
+                        *left += weight;
+                        Some(*left)
+                    }))
+                    .collect()
+            })
+            .collect();
+        let row_total = |row: &Vec<u32>| u64::from(row.last().copied().unwrap_or(0));
+        let total = prefix_sums
+            .iter()
+            .enumerate()
+            .map(|(row, sums)| if row == 0 { 1 } else { 2 } * row_total(sums))
+            .sum();
+        Self { bandwidth, half_widths, prefix_sums, total }
+    }
+
+    /// Cells on the border of the support.
+    pub fn perimeter(&self) -> f64 {
+        std::f64::consts::TAU * self.bandwidth
+    }
+
+    /// Weighted share of the support that the rows cover; row `center` holds the kernel's centre at bit `center`.
+    pub fn density<const W: usize>(&self, rows: &[BitRow<W>], center: usize) -> f32 {
+        let mut covered = 0u64;
+        for (dy, (half, sums)) in self.half_widths.iter().zip(&self.prefix_sums).enumerate() {
+            let first = center - *half as usize;
+            let mut add = |row: &BitRow<W>| {
+                row.for_each_run(|start, end| covered += u64::from(sums[end - first] - sums[start - first]));
+            };
+            add(&rows[center + dy]);
+            if dy > 0 {
+                add(&rows[center - dy]);
+            }
+        }
+        (covered as f64 / self.total as f64) as f32
+    }
+}
+
+/// Columns within d < h left and right of the centre, by row distance.
+fn half_widths(bandwidth: f64) -> Vec<i32> {
+    let is_inside = |dx: i32, dy: i32| f64::from(dx * dx + dy * dy) < bandwidth * bandwidth;
+    let reach = bandwidth.ceil() as i32;
+    (0..=reach).map_while(|dy| (0..=reach).take_while(|&dx| is_inside(dx, dy)).last()).collect()
+}
+
+fn weight(profile: KernelProfile, distance: f64, bandwidth: f64) -> f64 {
+    match profile {
+        KernelProfile::Uniform => 1.0,
+        KernelProfile::Gaussian => (-0.5 * (distance / bandwidth).powi(2)).exp(),
+        KernelProfile::Inverted => bandwidth * 1.871 - (bandwidth * bandwidth - distance * distance).sqrt(),
+    }
+}

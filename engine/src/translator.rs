@@ -1,0 +1,218 @@
+//! From scans to text: the first lines of SPEC section 2, one pure state machine per run.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::{ConfigError, TranslatorConfig};
+use crate::density::DensityEstimator;
+use crate::geometry::Pose2;
+use crate::grid::{Cell, LocalMap};
+use crate::sampling::{KeyframePose, KeyframeSampler, Place, PlaceSampler};
+use crate::scan::{Scan, ScanGeometry};
+use crate::text::{Observation, Quantizer, TextBuilder, Word};
+
+/// What one scan, or the end of a run, added.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Translation {
+    /// Pose of the scan in the run's frame.
+    pub run_from_robot: Pose2,
+    /// Set when the scan is a keyframe.
+    pub keyframe: Option<KeyframePose>,
+    /// New observations, in order of travel.
+    pub observations: Vec<Observation>,
+    /// New words of all levels, predecessors before successors.
+    pub words: Vec<Word>,
+}
+
+/// Translates the scans of one run, in the order of their sequence numbers.
+///
+/// Serialising and deserialising it at any moment does not change what it says afterwards.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(try_from = "SavedTranslator", into = "SavedTranslator")]
+pub struct Translator {
+    config: TranslatorConfig,
+    next_scan_seq: u64,
+    run_from_robot: Pose2,
+    local_map: LocalMap,
+    density: DensityEstimator,
+    places: PlaceSampler,
+    keyframes: KeyframeSampler,
+    text: TextBuilder,
+}
+
+impl Translator {
+    /// A translator at the start of a run, with the partition that the config begins with.
+    ///
+    /// # Errors
+    /// The first field of the config, or of the geometry, that cannot work.
+    pub fn new(config: &TranslatorConfig, geometry: ScanGeometry) -> Result<Self, ConfigError> {
+        Self::with_quantizer(config, geometry, config.quantizer.initial())
+    }
+
+    /// A translator at the start of a run that writes with a given partition of densities.
+    ///
+    /// # Errors
+    /// The first field of the config, or of the geometry, that cannot work.
+    pub fn with_quantizer(
+        config: &TranslatorConfig,
+        geometry: ScanGeometry,
+        quantizer: Quantizer,
+    ) -> Result<Self, ConfigError> {
+        config.validate("translator")?;
+        validate_geometry(&geometry, config.local_map.radius_m)?;
+        Ok(Self {
+            next_scan_seq: 0,
+            run_from_robot: Pose2::identity(),
+            local_map: LocalMap::new(&config.local_map, &geometry),
+            density: DensityEstimator::new(&config.density, config.local_map.resolution_m),
+            places: PlaceSampler::new(&config.sampling),
+            keyframes: KeyframeSampler::new(&config.sampling),
+            text: TextBuilder::new(quantizer, &config.text),
+            config: config.clone(),
+        })
+    }
+
+    /// Reads the next scan of the run.
+    pub fn push(&mut self, scan: &Scan) -> Translation {
+        let scan_seq = self.next_scan_seq;
+        self.next_scan_seq += 1;
+        // Pose: odometry as sent.
+        self.run_from_robot = scan.odom_from_robot;
+        let keyframe = self.keyframe(scan_seq, scan);
+        // Local map.
+        self.local_map.integrate_scan(&scan.ranges_m, &self.run_from_robot);
+        // Density and frontiers make an observation, of the places that lie the delay behind.
+        self.places.drive(Place {
+            scan_seq,
+            timestamp_ns: scan.timestamp_ns,
+            travel_m: 0.0,
+            odom_from_robot: scan.odom_from_robot,
+            run_from_robot: self.run_from_robot,
+        });
+        let mut observations = Vec::new();
+        while let Some(place) = self.places.next_ready() {
+            observations.push(self.observe(place));
+        }
+        // Observations make regions, regions make words of all levels.
+        let words = observations.iter().flat_map(|observation| self.text.push(observation)).collect();
+        Translation { run_from_robot: self.run_from_robot, keyframe, observations, words }
+    }
+
+    /// Ends the run: observes the places still within the delay as far as they are known, and writes the last word.
+    pub fn finish(&mut self) -> Translation {
+        let mut observations = Vec::new();
+        while let Some(place) = self.places.next_waiting() {
+            observations.push(self.observe(place));
+        }
+        let mut words: Vec<Word> =
+            observations.iter().flat_map(|observation| self.text.push(observation)).collect();
+        words.extend(self.text.finish());
+        Translation { run_from_robot: self.run_from_robot, keyframe: None, observations, words }
+    }
+
+    /// The partition that the text is written with.
+    pub fn quantizer(&self) -> &Quantizer {
+        self.text.quantizer()
+    }
+
+    /// Scans read so far; the sequence number of the next one.
+    pub fn num_scans(&self) -> u64 {
+        self.next_scan_seq
+    }
+
+    /// The local map as of the last scan.
+    pub fn local_map(&self) -> &LocalMap {
+        &self.local_map
+    }
+
+    fn keyframe(&mut self, scan_seq: u64, scan: &Scan) -> Option<KeyframePose> {
+        let motion_covariance = self.keyframes.drive(&scan.odom_from_robot)?;
+        Some(KeyframePose {
+            scan_seq,
+            timestamp_ns: scan.timestamp_ns,
+            odom_from_robot: scan.odom_from_robot,
+            run_from_robot: self.run_from_robot,
+            motion_covariance,
+        })
+    }
+
+    fn observe(&self, place: Place) -> Observation {
+        let cell = Cell::containing(&place.run_from_robot.position(), self.config.local_map.resolution_m);
+        let density = self.density.estimate(&self.local_map, cell);
+        Observation {
+            scan_seq: place.scan_seq,
+            timestamp_ns: place.timestamp_ns,
+            travel_m: place.travel_m,
+            odom_from_robot: place.odom_from_robot,
+            run_from_robot: place.run_from_robot,
+            densities: density.soft,
+            is_hard: density.is_hard,
+            num_frontiers: density.num_frontiers,
+        }
+    }
+}
+
+/// A laser that the local map can work with.
+fn validate_geometry(geometry: &ScanGeometry, radius_m: f64) -> Result<(), ConfigError> {
+    let error = |field: &str, problem: &str| Err(ConfigError::new(format!("geometry.{field}"), problem));
+    let increment = geometry.angle_increment_rad.abs();
+    if geometry.num_ranges == 0 || geometry.num_ranges > 20_000 {
+        return error("num_ranges", "must lie in 1..=20000");
+    }
+    if !geometry.angle_min_rad.is_finite() || geometry.angle_min_rad.abs() > 100.0 {
+        return error("angle_min_rad", "must be an angle in radians");
+    }
+    if !(1e-4..=std::f64::consts::TAU).contains(&increment) {
+        return error("angle_increment_rad", "must be at least 0.0001 and at most a turn, in radians");
+    }
+    if increment * (geometry.num_ranges - 1) as f64 > std::f64::consts::TAU + 1e-3 {
+        return error("angle_increment_rad", "times the number of ranges must not exceed a turn");
+    }
+    if !(geometry.range_max_m > 0.0 && geometry.range_max_m.is_finite()) {
+        return error("range_max_m", "must be positive, in metres");
+    }
+    let mount = &geometry.robot_from_laser;
+    if !mount.is_finite() || mount.x.hypot(mount.y) > radius_m / 4.0 {
+        return error("robot_from_laser", "must be finite and within a quarter of the local map's radius");
+    }
+    Ok(())
+}
+
+/// A translator as it is stored: what cannot be computed from the config.
+#[derive(Clone, Serialize, Deserialize)]
+struct SavedTranslator {
+    config: TranslatorConfig,
+    next_scan_seq: u64,
+    run_from_robot: Pose2,
+    local_map: LocalMap,
+    places: PlaceSampler,
+    keyframes: KeyframeSampler,
+    text: TextBuilder,
+}
+
+impl From<Translator> for SavedTranslator {
+    fn from(translator: Translator) -> Self {
+        let Translator {
+            config,
+            next_scan_seq,
+            run_from_robot,
+            local_map,
+            density: _,
+            places,
+            keyframes,
+            text,
+        } = translator;
+        Self { config, next_scan_seq, run_from_robot, local_map, places, keyframes, text }
+    }
+}
+
+impl TryFrom<SavedTranslator> for Translator {
+    type Error = ConfigError;
+
+    fn try_from(saved: SavedTranslator) -> Result<Self, ConfigError> {
+        let SavedTranslator { config, next_scan_seq, run_from_robot, local_map, places, keyframes, text } =
+            saved;
+        config.validate("translator")?;
+        let density = DensityEstimator::new(&config.density, config.local_map.resolution_m);
+        Ok(Self { config, next_scan_seq, run_from_robot, local_map, density, places, keyframes, text })
+    }
+}

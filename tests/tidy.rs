@@ -1,0 +1,223 @@
+//! The rules of the code base that no compiler checks: who may import whom, what the engine must not touch, how long a
+//! file and a function may grow. ARCHITECTURE.md gives the reasons.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Longest source file, in lines before its tests.
+const MAX_FILE_LINES: usize = 500;
+/// Longest function, in lines.
+const MAX_FUNCTION_LINES: usize = 80;
+
+/// Rooms of the engine in the order of the data flow, with the rooms that each may use besides `geometry`, `config`
+/// and itself.
+const ROOMS: &[(&str, &[&str])] = &[
+    ("geometry", &[]),
+    ("scan", &[]),
+    ("grid", &["scan"]),
+    ("density", &["scan", "grid"]),
+    ("text", &["scan", "grid", "density"]),
+    ("index", &["text"]),
+    ("matching", &["text", "index"]),
+    ("retrieval", &["text", "index", "matching"]),
+    ("registration", &["scan", "grid"]),
+    ("pose_graph", &[]),
+    ("formats", &["scan", "pose_graph"]),
+    ("evaluation", &["formats"]),
+];
+
+struct Source {
+    path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    /// The part before the file's unit tests.
+    fn code(&self) -> &str {
+        self.text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default()
+    }
+
+    /// Lines of code that are not comments.
+    fn statements(&self) -> impl Iterator<Item = (usize, &str)> {
+        self.code().lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
+    }
+
+    fn complaint(&self, line_idx: usize, problem: &str) -> String {
+        format!("{}:{}: {problem}", self.path.display(), line_idx + 1)
+    }
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+fn sources(folder: &str) -> Vec<Source> {
+    let mut found = Vec::new();
+    let mut pending = vec![workspace().join(folder)];
+    while let Some(folder) = pending.pop() {
+        for entry in fs::read_dir(&folder).expect("the folder is part of the repository") {
+            let path = entry.expect("a readable folder entry").path();
+            if path.is_dir() {
+                pending.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                let text = fs::read_to_string(&path).expect("sources are UTF-8");
+                found.push(Source { path, text });
+            }
+        }
+    }
+    found.sort_by(|a, b| a.path.cmp(&b.path));
+    assert!(!found.is_empty(), "no source found in {folder}");
+    found
+}
+
+fn check(complaints: Vec<String>) {
+    assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
+}
+
+fn forbid(sources: &[Source], words: &[&str]) -> Vec<String> {
+    let mut complaints = Vec::new();
+    for source in sources {
+        for (line_idx, line) in source.statements() {
+            for word in words.iter().filter(|word| line.contains(**word)) {
+                complaints.push(source.complaint(line_idx, &format!("`{word}` has no place here")));
+            }
+        }
+    }
+    complaints
+}
+
+#[test]
+fn the_engine_is_pure() {
+    let forbidden = [
+        "std::fs",
+        "std::net",
+        "std::time",
+        "std::env",
+        "println!",
+        "eprintln!",
+        "tokio",
+        "axum",
+        "sled::",
+        "rand::rng(",
+        "thread_rng",
+        "HashMap",
+        "HashSet",
+    ];
+    check(forbid(&sources("engine/src"), &forbidden));
+}
+
+#[test]
+fn rooms_use_only_the_rooms_before_them() {
+    let mut complaints = Vec::new();
+    for (room, may_use) in ROOMS {
+        let in_room = |source: &&Source| {
+            let path = source.path.to_string_lossy().replace('\\', "/");
+            path.contains(&format!("engine/src/{room}/")) || path.ends_with(&format!("engine/src/{room}.rs"))
+        };
+        for source in sources("engine/src").iter().filter(in_room) {
+            for (line_idx, line) in source.statements() {
+                for used in line.split("crate::").skip(1).filter_map(|rest| {
+                    rest.split(|c: char| !c.is_alphanumeric() && c != '_')
+                        .next()
+                        .filter(|name| !name.is_empty())
+                }) {
+                    let allowed =
+                        used == *room || ["geometry", "config"].contains(&used) || may_use.contains(&used);
+                    if !allowed {
+                        complaints
+                            .push(source.complaint(line_idx, &format!("`{room}` may not use `{used}`")));
+                    }
+                }
+            }
+        }
+    }
+    check(complaints);
+}
+
+#[test]
+fn sparse_algebra_stays_in_the_pose_graph() {
+    let elsewhere: Vec<_> = sources("engine/src")
+        .into_iter()
+        .filter(|source| !source.path.to_string_lossy().contains("pose_graph"))
+        .collect();
+    check(forbid(&elsewhere, &["faer::"]));
+}
+
+#[test]
+fn the_storage_engine_stays_behind_its_trait() {
+    let above: Vec<_> = sources("server/src")
+        .into_iter()
+        .filter(|source| !source.path.to_string_lossy().contains("storage"))
+        .collect();
+    check(forbid(&above, &["sled::"]));
+}
+
+#[test]
+fn use_cases_and_storage_know_no_http() {
+    let mut inner = sources("server/src/app");
+    inner.extend(sources("server/src/storage"));
+    check(forbid(&inner, &["axum::", "crate::handlers"]));
+}
+
+#[test]
+fn clients_speak_only_http() {
+    let complaints = forbid(&sources("clients"), &["locution_engine", "locution_server"]);
+    check(complaints);
+    let manifest =
+        fs::read_to_string(workspace().join("clients/rust/Cargo.toml")).expect("the client has a manifest");
+    assert!(!manifest.contains("locution-engine") && !manifest.contains("locution-server"));
+}
+
+#[test]
+fn every_file_says_what_it_is_for_and_stays_short() {
+    let mut complaints = Vec::new();
+    for folder in ["engine", "server/src", "clients", "openapi", "tests"] {
+        for source in sources(folder) {
+            if !source.text.starts_with("//!") {
+                complaints.push(source.complaint(0, "begins without a module header"));
+            }
+            let num_lines = source.code().lines().count();
+            if num_lines > MAX_FILE_LINES {
+                complaints
+                    .push(source.complaint(MAX_FILE_LINES, &format!("{num_lines} lines before its tests")));
+            }
+        }
+    }
+    check(complaints);
+}
+
+#[test]
+fn functions_fit_a_screen() {
+    let mut complaints = Vec::new();
+    for folder in ["engine/src", "server/src", "clients", "openapi/src"] {
+        for source in sources(folder) {
+            let lines: Vec<&str> = source.code().lines().collect();
+            for (start, line) in lines.iter().enumerate() {
+                let body = line.trim_start();
+                let is_function =
+                    ["fn ", "pub fn ", "async fn ", "pub async fn ", "pub(crate) fn ", "pub(super) fn "]
+                        .iter()
+                        .any(|opening| body.starts_with(opening));
+                if !is_function {
+                    continue;
+                }
+                let indent = &line[..line.len() - body.len()];
+                let closing = format!("{indent}}}");
+                let length = lines[start..].iter().position(|line| *line == closing).unwrap_or(0) + 1;
+                if length > MAX_FUNCTION_LINES {
+                    complaints.push(source.complaint(start, &format!("a function of {length} lines")));
+                }
+            }
+        }
+    }
+    check(complaints);
+}
+
+#[test]
+fn nothing_is_postponed_in_the_code() {
+    let mut complaints = Vec::new();
+    for folder in ["engine", "server", "clients", "openapi"] {
+        complaints.extend(forbid(&sources(folder), &["todo!(", "unimplemented!(", "dbg!("]));
+    }
+    check(complaints);
+}
