@@ -51,7 +51,8 @@ impl EngineConfig {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
         self.registration.validate("registration")?;
-        self.retrieval.validate("retrieval")
+        self.retrieval.validate("retrieval")?;
+        Ok(())
     }
 }
 
