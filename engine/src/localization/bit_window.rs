@@ -19,11 +19,6 @@ pub(super) fn or<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| a[word] | b[word])
 }
 
-/// True when no bit is set.
-pub(super) fn is_empty<const W: usize>(a: &Row<W>) -> bool {
-    a.iter().fold(0, |all, word| all | word) == 0
-}
-
 /// Every cell moved one to the right (towards higher bits).
 pub(super) fn shifted_right<const W: usize>(a: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| (a[word] << 1) | if word > 0 { a[word - 1] >> 63 } else { 0 })
@@ -32,19 +27,6 @@ pub(super) fn shifted_right<const W: usize>(a: &Row<W>) -> Row<W> {
 /// Every cell moved one to the left.
 pub(super) fn shifted_left<const W: usize>(a: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| (a[word] >> 1) | if word + 1 < W { a[word + 1] << 63 } else { 0 })
-}
-
-/// Every cell moved `count < 64` to the right.
-pub(super) fn shifted_by<const W: usize>(a: &Row<W>, count: usize) -> Row<W> {
-    if count == 0 {
-        return *a;
-    }
-    std::array::from_fn(|word| (a[word] << count) | if word > 0 { a[word - 1] >> (64 - count) } else { 0 })
-}
-
-/// True when the bit of a column is set.
-pub(super) fn has<const W: usize>(a: &Row<W>, column: usize) -> bool {
-    a[column / 64] >> (column % 64) & 1 == 1
 }
 
 /// The row whose bits `first..=last` are set; none when `last < first`.
@@ -118,19 +100,52 @@ impl BitPlanes {
         planes
     }
 
-    /// `64 W` free bits of a row from a column on; both may be up to the margin outside the map.
-    pub fn free_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
-        self.row(&self.free, column, row)
+    /// Words per row of the planes.
+    pub const fn words_per_row(&self) -> usize {
+        self.words_per_row
+    }
+
+    /// A column or row of the map, counted from the margin's edge.
+    pub const fn padded(&self, cell: i64) -> usize {
+        (cell + self.margin as i64) as usize
+    }
+
+    /// `64 W` free bits from a padded cell on to the right.
+    pub fn free_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
+        self.row(&self.free, row, column)
     }
 
     /// The same for unknown cells.
-    pub fn unknown_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
-        self.row(&self.unknown, column, row)
+    pub fn unknown_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
+        self.row(&self.unknown, row, column)
     }
 
-    fn row<const W: usize>(&self, plane: &[u64], column: i64, row: i64) -> Row<W> {
-        let column = (column + self.margin as i64) as usize;
-        let start = (row + self.margin as i64) as usize * self.words_per_row + column / 64;
+    /// The word of free bits that holds a padded cell.
+    #[inline]
+    pub fn free_word(&self, row: usize, column: usize) -> u64 {
+        self.free[row * self.words_per_row + column / 64]
+    }
+
+    /// Eight free bits from a padded cell on to the right.
+    pub fn free_byte(&self, row: usize, column: usize) -> u64 {
+        self.row::<1>(&self.free, row, column)[0] & 0xff
+    }
+
+    /// True when a padded cell is unknown.
+    #[inline]
+    pub fn is_unknown(&self, row: usize, column: usize) -> bool {
+        self.unknown[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
+    }
+
+    /// True when a padded cell is neither free nor unknown.
+    #[inline]
+    pub fn is_occupied(&self, row: usize, column: usize) -> bool {
+        let word = row * self.words_per_row + column / 64;
+        (self.free[word] | self.unknown[word]) >> (column % 64) & 1 == 0
+    }
+
+    fn row<const W: usize>(&self, plane: &[u64], row: usize, column: usize) -> Row<W> {
+        let start = row * self.words_per_row + column / 64;
         let (words, shift) = (&plane[start..=start + W], column % 64);
         std::array::from_fn(|word| match shift {
             0 => words[word],
@@ -143,6 +158,10 @@ impl BitPlanes {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    fn has(row: &Row<2>, column: usize) -> bool {
+        row[column / 64] >> (column % 64) & 1 == 1
+    }
 
     fn spread_by_steps(seed: &Row<3>, mask: &Row<3>) -> Row<3> {
         let mut reach = *seed;

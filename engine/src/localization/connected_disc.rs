@@ -1,31 +1,27 @@
 //! Free-space density of every cell of a map: the free cells inside a disc that hang together with its centre.
 //!
-//! Algorithm 3.1 floods a disc per cell. Neighbouring discs share nearly everything, so here the centres are taken in
-//! square blocks, and the flood of a block starts from what all its discs have in common:
+//! Algorithm 3.1 floods a disc per cell. Here a disc slides along a row of centres and its fill is kept up to date:
+//! one arc of cells leaves on the left, one enters on the right.
 //!
 //! ```text
-//!   root of 16 × 16 centres: flood the intersection of their discs
-//!     └─ 16 nodes of 4 × 4: that fill is connected in the larger intersection too, flood on from it
-//!          └─ 16 centres each: the whole disc, flood on from there
+//!        leaving   ┌──────────┐   entering        A leaving run is harmless when what it touches inside the disc
+//!            ░▒░   │          │  ▒                hangs together without it: the column to its right has no gap, or
+//!            ▒     │    c c'  │   ▒               a gap that eight columns more can bridge. Otherwise the fill might
+//!            ░▒░   │          │  ▒                fall apart, and the disc is flooded afresh.
+//!                  └──────────┘
 //! ```
 //!
-//! What was reached in an intersection of discs is reached in each of them, so a leaf only adds the thin lune that its
-//! own disc has more. Centres that do not hang together in the intersection form groups of their own. Rows are bits
-//! ([`super::bit_window`]), so a step of the flood handles 64 cells.
+//! Entering cells join when they touch the fill, and may open the way to more. Rows are bits ([`super::bit_window`]),
+//! so a flood afresh handles 64 cells a step.
 
-use super::bit_window::{
-    BitPlanes, Row, and, has, is_empty, or, shifted_by, shifted_left, shifted_right, span, spread,
-};
+use super::bit_window::{BitPlanes, Row, and, or, shifted_left, shifted_right, span, spread};
 use super::kernel_rows::KernelRows;
 
-/// Sides of the blocks of centres, from the root to the single centre.
-const SIDES: [usize; 3] = [BLOCK_SIDE, 4, 1];
-
-/// Centres per side of a root block.
-pub(super) const BLOCK_SIDE: usize = 16;
-
 /// Cells by which the planes of bits must reach beyond the map, on top of the disc's radius.
-pub(super) const MARGIN: usize = BLOCK_SIDE + 2;
+pub(super) const MARGIN: usize = 12;
+
+/// Cells per side of the square in which a gap may be bridged.
+const BRIDGE: usize = 8;
 
 /// What a flood found at a centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,237 +32,382 @@ pub(super) struct Fill {
     pub num_unknown: u32,
 }
 
-/// What the floods found at the centres of a block, row by row.
-pub(super) type Block = [[Option<Fill>; BLOCK_SIDE]; BLOCK_SIDE];
-
-/// A flooder with rows as wide as its kernel needs.
-pub(super) enum AnyFlooder<'a> {
-    /// One word per row.
-    Narrow(BlockFlooder<'a, 1>),
-    /// Two words: up to 5.6 m at 0.1 m per cell.
-    Middle(BlockFlooder<'a, 2>),
-    /// Four words.
-    Wide(BlockFlooder<'a, 4>),
-    /// Eight words.
-    Widest(BlockFlooder<'a, 8>),
+/// Leaving cells that lie one above the other, listed from the outside towards the disc's middle row.
+#[derive(Clone, Debug)]
+struct LeavingRun {
+    half_chord: usize,
+    rows: Vec<usize>,
+    /// The row after the last, where the disc is wider; none for the run on the middle row.
+    inner_row: Option<usize>,
 }
 
-impl<'a> AnyFlooder<'a> {
-    /// The narrowest flooder whose window holds a block and the kernel around it.
-    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
-        match 2 * kernel.radius() + BLOCK_SIDE {
-            0..=64 => Self::Narrow(BlockFlooder::new(planes, kernel)),
-            65..=128 => Self::Middle(BlockFlooder::new(planes, kernel)),
-            129..=256 => Self::Wide(BlockFlooder::new(planes, kernel)),
-            _ => Self::Widest(BlockFlooder::new(planes, kernel)),
-        }
-    }
-
-    /// Fills of the `side × side` centres from (column, row) on, row by row; None where the centre is not free.
-    pub fn flood_block(&mut self, column: i64, row: i64, side: usize) -> Block {
-        match self {
-            Self::Narrow(flooder) => flooder.flood_block(column, row, side),
-            Self::Middle(flooder) => flooder.flood_block(column, row, side),
-            Self::Wide(flooder) => flooder.flood_block(column, row, side),
-            Self::Widest(flooder) => flooder.flood_block(column, row, side),
-        }
-    }
-}
-
-/// Floods blocks of centres; owns the scratch rows of one thread.
-pub(super) struct BlockFlooder<'a, const W: usize> {
+/// A disc that slides along rows of centres; owns the scratch planes of one thread.
+pub(super) struct DiscSweep<'a, const W: usize> {
     planes: &'a BitPlanes,
     kernel: &'a KernelRows,
-    /// Per level: the intersection of the discs of a block whose lower left centre has column 0, from its first row.
-    intersections: [Vec<Row<W>>; SIDES.len()],
-    free: Vec<Row<W>>,
-    unknown: Vec<Row<W>>,
-    /// Free cells inside the intersection of each level.
-    masks: [Vec<Row<W>>; SIDES.len()],
-    reaches: [Vec<Row<W>>; SIDES.len()],
+    runs: Vec<LeavingRun>,
+    /// Half chord of each row of the disc.
+    half_chords: Vec<usize>,
+    /// Free cells of the fill and unknown cells beside it, as bits of the rows that the disc covers.
+    reach: Vec<u64>,
+    touched: Vec<u64>,
+    /// First row of the disc, counted in rows of the planes.
+    bottom: usize,
+    num_reached: u32,
+    num_touched: u32,
+    stack: Vec<(usize, usize)>,
 }
 
-impl<'a, const W: usize> BlockFlooder<'a, W> {
-    /// A flooder for discs of a kernel; the window of a block must fit: `2 radius + 16 ≤ 64 W`.
-    fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
-        let num_rows = 2 * kernel.radius() + BLOCK_SIDE;
-        let empty = || vec![[0; W]; num_rows];
+impl<'a, const W: usize> DiscSweep<'a, W> {
+    /// A sweep of a kernel whose disc must fit into `64 W` columns.
+    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
+        let radius = kernel.radius();
+        let half_chord = |row: usize| kernel.half_chord(row.abs_diff(radius)).unwrap_or(0);
+        let half_chords: Vec<usize> = (0..2 * radius + 1).map(half_chord).collect();
+        let num_words = half_chords.len() * planes.words_per_row();
         Self {
             planes,
             kernel,
-            intersections: SIDES.map(|side| intersection_of_discs(kernel, side)),
-            free: empty(),
-            unknown: empty(),
-            masks: SIDES.map(|_| empty()),
-            reaches: SIDES.map(|_| empty()),
+            runs: leaving_runs(&half_chords),
+            half_chords,
+            reach: vec![0; num_words],
+            touched: vec![0; num_words],
+            bottom: 0,
+            num_reached: 0,
+            num_touched: 0,
+            stack: Vec::new(),
         }
     }
 
-    /// Fills of the `side × side` centres from (column, row) on, row by row; None where the centre is not free.
-    fn flood_block(&mut self, column: i64, row: i64, side: usize) -> Block {
-        let mut fills = [[None; BLOCK_SIDE]; BLOCK_SIDE];
+    /// Fills of the centres of a row from `column` on; None where the centre is not free.
+    pub fn sweep(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
         let radius = self.kernel.radius();
-        let (left, bottom) = (column - radius as i64, row - radius as i64);
-        for window_row in 0..self.free.len() {
-            self.free[window_row] = self.planes.free_row(left, bottom + window_row as i64);
-            self.unknown[window_row] = self.planes.unknown_row(left, bottom + window_row as i64);
-        }
-        let mut centres = [0u16; BLOCK_SIDE];
-        for (y, bits) in centres.iter_mut().enumerate().take(side) {
-            for x in 0..side {
-                *bits |= u16::from(has(&self.free[y + radius], x + radius)) << x;
+        self.bottom = self.planes.padded(row) - radius;
+        self.clear();
+        let mut was_free = false;
+        for (centre, fill) in (self.planes.padded(column)..).zip(fills) {
+            let is_free = self.is_free(radius, centre);
+            if is_free && !(was_free && radius > 2 && self.slide_to(centre)) {
+                self.flood(centre);
             }
+            *fill = is_free.then(|| self.read(centre));
+            was_free = is_free;
         }
-        self.flood_node(0, (0, 0), &centres, false, &mut fills);
-        fills
     }
 
-    /// Floods the wanted `centres` of a node; `from_parent` says that they all hang together with the parent's reach.
-    fn flood_node(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        centres: &[u16; BLOCK_SIDE],
-        from_parent: bool,
-        fills: &mut Block,
-    ) {
-        let mut remaining = wanted_within(centres, corner, SIDES[level]);
-        if remaining.iter().all(|&bits| bits == 0) {
-            return;
+    fn clear(&mut self) {
+        self.reach.fill(0);
+        self.touched.fill(0);
+        (self.num_reached, self.num_touched) = (0, 0);
+    }
+
+    /// Moves the disc from the centre on the left to `centre`; false when the fill might fall apart.
+    fn slide_to(&mut self, centre: usize) -> bool {
+        if !self.is_safe_to_leave(centre - 1) {
+            return false;
         }
-        let rows = self.mask_node(level, corner);
-        if from_parent {
-            let group = std::mem::replace(&mut remaining, [0; BLOCK_SIDE]);
-            let parent_side = SIDES[level - 1];
-            let parent_rows = self.rows_of(parent_side, corner.1 / parent_side * parent_side);
-            let (before, after) = self.reaches.split_at_mut(level);
-            for row in rows.clone() {
-                let is_shared = parent_rows.contains(&row);
-                after[0][row] =
-                    if is_shared { and(&before[level - 1][row], &self.masks[level][row]) } else { [0; W] };
-            }
-            self.settle(level, rows.clone());
-            self.descend(level, corner, &group, fills);
-        }
-        let radius = self.kernel.radius();
-        while let Some((x, y)) = first_set(&remaining) {
-            self.reaches[level][rows.clone()].fill([0; W]);
-            let mut group = [0; BLOCK_SIDE];
-            let is_inside = rows.contains(&(y + radius)) && has(&self.masks[level][y + radius], x + radius);
-            if is_inside {
-                self.reaches[level][y + radius] = span((x + radius) as i64, (x + radius) as i64);
-                self.settle(level, rows.clone());
-                group = self.reached_of(level, &remaining);
-                for (left, taken) in remaining.iter_mut().zip(&group) {
-                    *left &= !taken;
+        self.leave(centre - 1);
+        self.enter(centre);
+        true
+    }
+
+    /// True when the fill stays in one piece without the cells that leave as the disc moves right from `centre`.
+    fn is_safe_to_leave(&self, centre: usize) -> bool {
+        for run in &self.runs {
+            let column = centre - run.half_chord;
+            // The last free cell to the right of the current stretch of leaving cells.
+            let mut last_free: Option<usize> = None;
+            let mut is_leaving = false;
+            for &row in &run.rows {
+                if !self.is_reached(row, column) {
+                    (last_free, is_leaving) = (None, false);
+                    continue;
                 }
-                self.descend(level, corner, &group, fills);
-            } else {
-                // The intersection of a small kernel's discs may not even hold its own centres.
-                group[y] = 1 << x;
-                remaining[y] &= !(1 << x);
-                self.descend_alone(level, corner, &group, fills);
+                is_leaving = true;
+                if self.is_free(row, column + 1) {
+                    if last_free
+                        .is_some_and(|last| last.abs_diff(row) > 1 && !self.is_bridged(last, row, column + 1))
+                    {
+                        return false;
+                    }
+                    last_free = Some(row);
+                }
+            }
+            if let (true, Some(inner), Some(last)) = (is_leaving, run.inner_row, last_free) {
+                // The cell below (or above) the run stays; it must hang together with the cells to the right.
+                let needs_bridge = self.is_reached(inner, column)
+                    && !(self.is_free(inner, column + 1)
+                        && (last.abs_diff(inner) == 1 || self.is_bridged(last, inner, column + 1)));
+                if needs_bridge {
+                    return false;
+                }
             }
         }
+        true
     }
 
-    /// Hands a settled group to the children, or reads the result at a leaf.
-    fn descend(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        group: &[u16; BLOCK_SIDE],
-        fills: &mut Block,
-    ) {
-        if level + 1 == SIDES.len() {
-            fills[corner.1][corner.0] = Some(self.read(level, corner));
-            return;
+    /// True when two free cells of a column hang together within the eight columns from it on and the rows between.
+    fn is_bridged(&self, first: usize, second: usize, column: usize) -> bool {
+        let (low, high) = (first.min(second).saturating_sub(1), first.max(second) + 1);
+        let is_inside = high < self.half_chords.len()
+            && high - low < BRIDGE
+            && self.half_chords[low].min(self.half_chords[high]) >= BRIDGE
+            && self.half_chords[low].abs_diff(self.half_chords[high]) == 0;
+        if !is_inside {
+            return false;
         }
-        for child in children(level, corner) {
-            self.flood_node(level + 1, child, group, true, fills);
+        let mut board = 0u64;
+        for row in low..=high {
+            board |= self.planes.free_byte(self.bottom + row, column) << (BRIDGE * (row - low));
         }
-    }
-
-    /// Hands a centre outside the intersection to its child, which starts afresh.
-    fn descend_alone(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        group: &[u16; BLOCK_SIDE],
-        fills: &mut Block,
-    ) {
-        for child in children(level, corner) {
-            self.flood_node(level + 1, child, group, false, fills);
-        }
-    }
-
-    /// Rows of the window that the intersection of a node's discs may cover; `y` is its first row of centres.
-    fn rows_of(&self, side: usize, y: usize) -> std::ops::Range<usize> {
-        let first = y + side - 1;
-        first..(y + 2 * self.kernel.radius() + 1).max(first)
-    }
-
-    /// Writes the free cells of a node's intersection into its mask; returns the rows it covers.
-    fn mask_node(&mut self, level: usize, (x, y): (usize, usize)) -> std::ops::Range<usize> {
-        let rows = self.rows_of(SIDES[level], y);
-        for row in rows.clone() {
-            let disc = shifted_by(&self.intersections[level][row - y], x);
-            self.masks[level][row] = and(&self.free[row], &disc);
-        }
-        rows
-    }
-
-    /// Floods the reach of a level within its mask, by alternating passes until one changes nothing.
-    fn settle(&mut self, level: usize, rows: std::ops::Range<usize>) {
-        let (reach, mask) = (&mut self.reaches[level][rows.clone()], &self.masks[level][rows]);
-        let num_rows = reach.len();
-        let mut passes = 0;
+        let goal = 1u64 << (BRIDGE * (second - low));
+        let mut reached = 1u64 << (BRIDGE * (first - low));
         loop {
-            let mut has_changed = false;
-            let mut before = [0; W];
-            for step in 0..num_rows {
-                let row = if passes % 2 == 0 { step } else { num_rows - 1 - step };
-                before = grow(&before, &mut reach[row], &mask[row], &mut has_changed);
+            let sideways = (reached << 1 & !FIRST_COLUMN) | (reached >> 1 & !(FIRST_COLUMN << (BRIDGE - 1)));
+            let next = (reached | sideways | reached << BRIDGE | reached >> BRIDGE) & board;
+            if next & goal != 0 || next == reached {
+                return next & goal != 0;
             }
-            passes += 1;
-            if !has_changed && passes > 1 {
+            reached = next;
+        }
+    }
+
+    /// Takes the left arc of the disc around `centre` out of the fill.
+    fn leave(&mut self, centre: usize) {
+        for row in 0..self.half_chords.len() {
+            let column = centre - self.half_chords[row];
+            let (word, bit) = self.place(row, column);
+            self.num_reached -= u32::from(self.reach[word] & bit != 0);
+            self.num_touched -= u32::from(self.touched[word] & bit != 0);
+            self.reach[word] &= !bit;
+            self.touched[word] &= !bit;
+        }
+        if self.num_touched > 0 {
+            self.untouch(centre);
+        }
+    }
+
+    /// Unknown cells beside the left arc may have lost their last neighbour in the fill.
+    fn untouch(&mut self, centre: usize) {
+        for row in 0..self.half_chords.len() {
+            let column = centre - self.half_chords[row];
+            let beside = [(row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
+            for (row, column) in beside {
+                if row < self.half_chords.len()
+                    && self.is_touched(row, column)
+                    && !self.touches_reach(row, column)
+                {
+                    let (word, bit) = self.place(row, column);
+                    self.touched[word] &= !bit;
+                    self.num_touched -= 1;
+                }
+            }
+        }
+    }
+
+    /// Takes the right arc of the disc around `centre` into the fill.
+    fn enter(&mut self, centre: usize) {
+        let last_row = self.half_chords.len() - 1;
+        for row in 0..=last_row {
+            let column = centre + self.half_chords[row];
+            let (word, bit) = self.place(row, column);
+            if self.planes.free_word(self.bottom + row, column) & bit != 0 && self.is_reached(row, column - 1)
+            {
+                self.reach[word] |= bit;
+                self.num_reached += 1;
+            }
+        }
+        for row in 0..=last_row {
+            let column = centre + self.half_chords[row];
+            if self.is_free(row, column) {
+                self.enter_free(row, column, centre);
+            } else if self.planes.is_unknown(self.bottom + row, column) {
+                self.touch_if_beside_reach(row, column);
+            }
+        }
+    }
+
+    /// Follows an entering free cell to whatever hangs on it.
+    fn enter_free(&mut self, row: usize, column: usize, centre: usize) {
+        let above_and_below = [row.wrapping_sub(1), row + 1];
+        if !self.is_reached(row, column) {
+            let hangs_on = above_and_below
+                .iter()
+                .any(|&other| other < self.half_chords.len() && self.is_reached(other, column));
+            if !hangs_on {
                 return;
             }
+            self.reach_cell(row, column);
+        }
+        let leads_on = |sweep: &Self, row: usize, column: usize| {
+            row < sweep.half_chords.len()
+                && sweep.is_inside(row, column, centre)
+                && !sweep.is_reached(row, column)
+                && !sweep.is_touched(row, column)
+                && !sweep.planes.is_occupied(sweep.bottom + row, column)
+        };
+        let is_open = leads_on(self, row, column - 1)
+            || above_and_below.iter().any(|&other| leads_on(self, other, column));
+        if is_open {
+            self.stack.push((row, column));
+            self.flood_on(centre);
         }
     }
 
-    fn reached_of(&self, level: usize, centres: &[u16; BLOCK_SIDE]) -> [u16; BLOCK_SIDE] {
-        let radius = self.kernel.radius();
-        std::array::from_fn(|y| {
-            let row = &self.reaches[level][y + radius];
-            (0..BLOCK_SIDE).fold(0, |bits, x| {
-                let is_reached = centres[y] >> x & 1 == 1 && has(row, x + radius);
-                bits | u16::from(is_reached) << x
-            })
-        })
+    /// Spreads from the cells on the stack, cell by cell.
+    fn flood_on(&mut self, centre: usize) {
+        while let Some((row, column)) = self.stack.pop() {
+            let around =
+                [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
+            for (row, column) in around {
+                if row >= self.half_chords.len()
+                    || !self.is_inside(row, column, centre)
+                    || self.is_reached(row, column)
+                {
+                    continue;
+                }
+                if self.is_free(row, column) {
+                    self.reach_cell(row, column);
+                    self.stack.push((row, column));
+                } else if self.planes.is_unknown(self.bottom + row, column) {
+                    self.touch_if_beside_reach(row, column);
+                }
+            }
+        }
     }
 
-    /// Kernel mass and unknown neighbours of a settled leaf.
-    fn read(&self, level: usize, (x, y): (usize, usize)) -> Fill {
-        let num_rows = 2 * self.kernel.radius() + 1;
-        let reach = &self.reaches[level][y..y + num_rows];
-        let mut num_unknown = 0;
+    /// Floods the disc around `centre` from nothing.
+    fn flood(&mut self, centre: usize) {
+        let radius = self.kernel.radius();
+        let left = centre - radius;
+        let num_rows = self.half_chords.len();
+        let mut masks = vec![[0; W]; num_rows];
+        let mut reach = vec![[0; W]; num_rows];
+        for (row, mask) in masks.iter_mut().enumerate() {
+            *mask = and(&self.planes.free_row(self.bottom + row, left), &self.disc_row(row));
+        }
+        reach[radius] = span(radius as i64, radius as i64);
+        settle(&mut reach, &masks, radius);
+        self.clear();
         let mut before = [0; W];
         for row in 0..num_rows {
-            let after = if row + 1 < num_rows { reach[row + 1] } else { [0; W] };
-            let beside = or(&shifted_left(&reach[row]), &shifted_right(&reach[row]));
-            let touched = and(&or(&or(&before, &after), &beside), &self.unknown[y + row]);
-            if !is_empty(&touched) {
-                let disc = shifted_by(&self.intersections[level][row], x);
-                num_unknown += and(&touched, &disc).iter().map(|word| word.count_ones()).sum::<u32>();
-            }
+            let after = reach.get(row + 1).copied().unwrap_or([0; W]);
+            let beside =
+                or(&or(&before, &after), &or(&shifted_left(&reach[row]), &shifted_right(&reach[row])));
+            let unknown = and(&self.planes.unknown_row(self.bottom + row, left), &self.disc_row(row));
+            let touched = and(&beside, &unknown);
+            let start = row * self.planes.words_per_row();
+            self.num_reached += write_row(&mut self.reach[start..], left, &reach[row]);
+            self.num_touched += write_row(&mut self.touched[start..], left, &touched);
             before = reach[row];
         }
-        Fill { density: self.kernel.mass(reach, x), num_unknown }
+    }
+
+    fn disc_row(&self, row: usize) -> Row<W> {
+        let (radius, half) = (self.kernel.radius() as i64, self.half_chords[row] as i64);
+        span(radius - half, radius + half)
+    }
+
+    /// Kernel mass and unknown neighbours of the fill around `centre`.
+    fn read(&self, centre: usize) -> Fill {
+        let density = self.kernel.mass_of_count(self.num_reached).unwrap_or_else(|| {
+            let left = centre - self.kernel.radius();
+            let words = self.planes.words_per_row();
+            let rows = (0..self.half_chords.len()).map(|row| read_row::<W>(&self.reach[row * words..], left));
+            self.kernel.mass(rows)
+        });
+        Fill { density, num_unknown: self.num_touched }
+    }
+
+    fn place(&self, row: usize, column: usize) -> (usize, u64) {
+        (row * self.planes.words_per_row() + column / 64, 1 << (column % 64))
+    }
+
+    fn is_inside(&self, row: usize, column: usize, centre: usize) -> bool {
+        column.abs_diff(centre) <= self.half_chords[row]
+    }
+
+    fn is_free(&self, row: usize, column: usize) -> bool {
+        self.planes.free_word(self.bottom + row, column) >> (column % 64) & 1 == 1
+    }
+
+    fn is_reached(&self, row: usize, column: usize) -> bool {
+        let (word, bit) = self.place(row, column);
+        self.reach[word] & bit != 0
+    }
+
+    fn is_touched(&self, row: usize, column: usize) -> bool {
+        let (word, bit) = self.place(row, column);
+        self.touched[word] & bit != 0
+    }
+
+    fn touches_reach(&self, row: usize, column: usize) -> bool {
+        self.is_reached(row, column - 1)
+            || self.is_reached(row, column + 1)
+            || (row > 0 && self.is_reached(row - 1, column))
+            || (row + 1 < self.half_chords.len() && self.is_reached(row + 1, column))
+    }
+
+    fn reach_cell(&mut self, row: usize, column: usize) {
+        let (word, bit) = self.place(row, column);
+        self.reach[word] |= bit;
+        self.num_reached += 1;
+    }
+
+    fn touch_if_beside_reach(&mut self, row: usize, column: usize) {
+        if !self.is_touched(row, column) && self.touches_reach(row, column) {
+            let (word, bit) = self.place(row, column);
+            self.touched[word] |= bit;
+            self.num_touched += 1;
+        }
     }
 }
 
-/// Adds to a row what the row `before` and its own cells lead to; returns the row.
+/// The leftmost column of a square of 8 × 8 cells.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
+
+/// The left arc as runs of equal half chord, each from the outside inwards.
+fn leaving_runs(half_chords: &[usize]) -> Vec<LeavingRun> {
+    let middle = half_chords.len() / 2;
+    let mut runs = Vec::new();
+    let mut first = 0;
+    while first < half_chords.len() {
+        let half_chord = half_chords[first];
+        let len = half_chords[first..].iter().take_while(|&&half| half == half_chord).count();
+        let rows: Vec<usize> = (first..first + len).collect();
+        let run = match (rows.contains(&middle), first < middle) {
+            (true, _) => LeavingRun { half_chord, rows, inner_row: None },
+            (false, true) => LeavingRun { half_chord, rows, inner_row: Some(first + len) },
+            (false, false) => {
+                LeavingRun { half_chord, rows: rows.into_iter().rev().collect(), inner_row: Some(first - 1) }
+            }
+        };
+        runs.push(run);
+        first += len;
+    }
+    runs
+}
+
+/// Floods `reach` within `masks`, by alternating passes until one changes nothing; starts at the `middle` row.
+fn settle<const W: usize>(reach: &mut [Row<W>], masks: &[Row<W>], middle: usize) {
+    let num_rows = reach.len();
+    reach[middle] = spread(&reach[middle], &masks[middle]);
+    let mut passes = 0;
+    loop {
+        let mut has_changed = false;
+        let mut before = [0; W];
+        for step in 0..num_rows {
+            let row = if passes % 2 == 0 { step } else { num_rows - 1 - step };
+            before = grow(&before, &mut reach[row], &masks[row], &mut has_changed);
+        }
+        passes += 1;
+        if !has_changed && passes > 1 {
+            return;
+        }
+    }
+}
+
+/// Adds to a row what the row `before` leads to; returns the row.
 fn grow<const W: usize>(
     before: &Row<W>,
     reach: &mut Row<W>,
@@ -274,43 +415,35 @@ fn grow<const W: usize>(
     has_changed: &mut bool,
 ) -> Row<W> {
     let seed = or(reach, &and(before, mask));
-    let beside = or(&shifted_left(&seed), &shifted_right(&seed));
-    let has_more = (0..W).fold(0, |more, word| more | (beside[word] & mask[word] & !seed[word])) != 0;
-    let grown = if has_more { spread(&seed, mask) } else { seed };
-    *has_changed |= grown != *reach;
-    *reach = grown;
-    grown
+    if seed != *reach {
+        *reach = spread(&seed, mask);
+        *has_changed = true;
+    }
+    *reach
 }
 
-fn wanted_within(centres: &[u16; BLOCK_SIDE], (x, y): (usize, usize), side: usize) -> [u16; BLOCK_SIDE] {
-    let columns = ((1u32 << side) - 1) << x;
-    std::array::from_fn(|row| if (y..y + side).contains(&row) { centres[row] & columns as u16 } else { 0 })
+/// Writes a window's row into a row of words from a column on; returns the number of set bits.
+fn write_row<const W: usize>(words: &mut [u64], column: usize, row: &Row<W>) -> u32 {
+    let (first, shift) = (column / 64, column % 64);
+    let mut num_set = 0;
+    for (word, &bits) in row.iter().enumerate() {
+        num_set += bits.count_ones();
+        words[first + word] |= bits << shift;
+        if shift > 0 && bits >> (64 - shift) != 0 {
+            words[first + word + 1] |= bits >> (64 - shift);
+        }
+    }
+    num_set
 }
 
-fn first_set(centres: &[u16; BLOCK_SIDE]) -> Option<(usize, usize)> {
-    let y = centres.iter().position(|&bits| bits != 0)?;
-    Some((centres[y].trailing_zeros() as usize, y))
-}
-
-fn children(level: usize, (x, y): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
-    let (side, child) = (SIDES[level], SIDES[level + 1]);
-    (0..side / child)
-        .flat_map(move |row| (0..side / child).map(move |column| (x + column * child, y + row * child)))
-}
-
-/// Rows of the intersection of the discs of `side × side` centres, the lower left of which has column `radius`.
-fn intersection_of_discs<const W: usize>(kernel: &KernelRows, side: usize) -> Vec<Row<W>> {
-    let radius = kernel.radius() as i64;
-    (0..2 * radius + side as i64)
-        .map(|row| {
-            let y = row - radius;
-            let farthest = y.abs().max((y - (side as i64 - 1)).abs());
-            match kernel.half_chord(farthest as usize) {
-                Some(half) => span(side as i64 - 1 - half as i64 + radius, half as i64 + radius),
-                None => [0; W],
-            }
-        })
-        .collect()
+/// `64 W` bits of a row of words from a column on.
+fn read_row<const W: usize>(words: &[u64], column: usize) -> Row<W> {
+    let (first, shift) = (column / 64, column % 64);
+    std::array::from_fn(|word| {
+        let low = words[first + word] >> shift;
+        let high = words.get(first + word + 1).copied().unwrap_or(0);
+        if shift == 0 { low } else { low | high << (64 - shift) }
+    })
 }
 
 #[cfg(test)]
@@ -382,8 +515,20 @@ mod tests {
         map
     }
 
+    fn sweep_all(map: &GridMap, planes: &BitPlanes, kernel: &KernelRows) -> Vec<Option<Fill>> {
+        let mut fills = vec![None; map.width() * map.height()];
+        for (row, fills) in fills.chunks_exact_mut(map.width()).enumerate() {
+            if kernel.radius() < 32 {
+                DiscSweep::<1>::new(planes, kernel).sweep(0, row as i64, fills);
+            } else {
+                DiscSweep::<2>::new(planes, kernel).sweep(0, row as i64, fills);
+            }
+        }
+        fills
+    }
+
     #[test]
-    fn blocks_agree_with_the_literal_flood() {
+    fn sliding_discs_agree_with_the_literal_flood() {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
         let cases =
             [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
@@ -392,26 +537,21 @@ mod tests {
                 let map = random_building(&mut rng, width, height);
                 let kernel = KernelRows::new(profile, h);
                 let planes = BitPlanes::new(&map, kernel.radius() + MARGIN);
-                let mut flooder = AnyFlooder::new(&planes, &kernel);
-                for (left, bottom) in
-                    (0..width).step_by(16).flat_map(|x| (0..height).step_by(16).map(move |y| (x, y)))
-                {
-                    let block = flooder.flood_block(left as i64, bottom as i64, 16);
-                    for (x, y) in (0..16).flat_map(|x| (0..16).map(move |y| (x, y))) {
-                        let cell = ((left + x) as i64, (bottom + y) as i64);
-                        if h > 10.0 && rng.random_range(0..8) > 0 {
-                            continue;
+                let fills = sweep_all(&map, &planes, &kernel);
+                for (cell, fast) in fills.iter().enumerate() {
+                    let cell = ((cell % width) as i64, (cell / width) as i64);
+                    if h > 10.0 && rng.random_range(0..8) > 0 {
+                        continue;
+                    }
+                    match (fast, literal_fill(&map, cell, profile, h)) {
+                        (Some(fast), Some(slow)) => {
+                            assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
+                            assert!(
+                                (fast.density - slow.density).abs() < 1e-5,
+                                "{fast:?} {slow:?} h {h} at {cell:?}"
+                            );
                         }
-                        match (block[y][x], literal_fill(&map, cell, profile, h)) {
-                            (Some(fast), Some(slow)) => {
-                                assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
-                                assert!(
-                                    (fast.density - slow.density).abs() < 1e-5,
-                                    "{fast:?} {slow:?} h {h} at {cell:?}"
-                                );
-                            }
-                            (fast, slow) => assert_eq!(fast, slow, "h {h} at {cell:?}"),
-                        }
+                        (fast, slow) => assert_eq!(*fast, slow, "h {h} at {cell:?}"),
                     }
                 }
             }
