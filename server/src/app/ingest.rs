@@ -19,7 +19,6 @@ use super::run_writer::{RunWriter, WriterState};
 use super::runs::RunInfo;
 use super::scans::{append_scans, find_receipt, is_same_scan, read_scans};
 use super::site::Site;
-use super::translation::Translated;
 use super::{App, AppError, Name, on_blocking_thread};
 use crate::storage::Batch;
 
@@ -233,10 +232,10 @@ async fn append_fresh(
     let run = writer.idx;
     let mut translator = state.take_translator()?;
     let (translator, scans, translated) = on_blocking_thread(move || {
-        let mut translated = Translated::default();
-        translator.translate(&scans, &mut translated).map(|()| (translator, scans, translated))
+        let translated = translator.translate(&scans);
+        (translator, scans, translated)
     })
-    .await??;
+    .await?;
     state.translator = Some(translator);
     let translated_s = started.elapsed().as_secs_f64();
     let mut batch = Batch::default();
@@ -262,12 +261,8 @@ async fn append_fresh(
 
 /// Stores the tail of a text. A finished run needs no translator again, so the stored one goes.
 async fn finish(site: &Site, writer: &RunWriter, state: &mut WriterState) -> Result<(), AppError> {
-    let mut translator = state.take_translator()?;
-    let translated = on_blocking_thread(move || {
-        let mut translated = Translated::default();
-        translator.finish(&mut translated).map(|()| translated)
-    })
-    .await??;
+    let translator = state.take_translator()?;
+    let translated = on_blocking_thread(move || translator.finish()).await?;
     let mut batch = Batch::default();
     state.append_text(writer.idx, &translated, &mut batch);
     state.head.value.is_finished = true;

@@ -7,6 +7,7 @@ use locution_engine::scan::ScanGeometry;
 use super::records::{RunHead, StoredRun, TextHead};
 use super::run_writer::RunWriter;
 use super::site::Site;
+use super::translation::RunTranslator;
 use super::{App, AppError, Name};
 use crate::storage::keys::{Key, RunIdx};
 use crate::storage::{Reader, StorageError, codec};
@@ -46,7 +47,12 @@ impl App {
                 let detail = format!("the run `{name}` stands with another geometry or robot");
                 Err(AppError::Exists { detail })
             }
-            Err(AppError::NotFound { .. }) => self.create_run(site, name, new).await,
+            Err(AppError::NotFound { .. }) => {
+                // A laser that no translator takes is refused here, not at the first batch.
+                let text_config = site.state().text_config()?;
+                RunTranslator::new(&text_config.engine, &new.geometry, text_config.quantizer)?;
+                self.create_run(site, name, new).await
+            }
             Err(error) => Err(error),
         }
     }
