@@ -48,6 +48,7 @@ impl App {
         // A task of its own: a client that hangs up must not stop a commit half way.
         let work = async move {
             let _place = writer.queue()?;
+            let _generation = site.serving.read().await;
             let mut slot = writer.state.lock().await;
             app.open_runs.used(&writer);
             let mut state = app.wake(&site, &writer, slot.take()).await?;
@@ -70,10 +71,12 @@ impl App {
         let for_task = Arc::clone(&site);
         let work = async move {
             let _place = writer.queue()?;
+            let _generation = for_task.serving.read().await;
             let mut slot = writer.state.lock().await;
             let mut state = app.wake(&for_task, &writer, slot.take()).await?;
             if !state.head.value.is_finished {
                 finish(&for_task, &writer, &mut state).await?;
+                app.build_soon(&for_task);
             }
             Ok::<_, AppError>(())
         };
@@ -236,7 +239,7 @@ async fn append_fresh(
         (translator, scans, translated)
     })
     .await?;
-    state.translator = Some(translator);
+    state.put_translator(translator);
     let translated_s = started.elapsed().as_secs_f64();
     let mut batch = Batch::default();
     state.append_text(run, &translated, &mut batch);

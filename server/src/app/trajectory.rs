@@ -52,9 +52,10 @@ impl Site {
         &self,
         info: &RunInfo,
         frame: Frame,
-        _version: Option<u64>,
+        version: Option<u64>,
     ) -> Result<Trajectory, AppError> {
         let stamps = read_stamps(&**self.store(), info.idx, 0..info.head.next_sequence).await?;
+        let mut component = None;
         let anchors = match frame {
             Frame::Odom => Vec::new(),
             Frame::Run => {

@@ -2,6 +2,8 @@
 
 pub mod batches;
 pub mod common;
+pub mod jobs;
+pub mod maps;
 pub mod runs;
 pub mod sites;
 pub mod texts;
