@@ -1,80 +1,75 @@
 //! Free-space density of every cell of a map: the free cells inside a disc that hang together with its centre.
 //!
 //! Algorithm 3.1 floods a disc per cell. Here a disc slides along a row of centres and its fill is kept up to date:
-//! one arc of cells leaves on the left, one enters on the right.
+//! one arc of cells leaves on the left, one enters on the right ([`super::arc_planes`] has them as words, a bit per row
+//! of the disc).
 //!
 //! ```text
-//!        leaving   ┌──────────┐   entering        A leaving run is harmless when what it touches inside the disc
-//!            ░▒░   │          │  ▒                hangs together without it: the column to its right has no gap, or
-//!            ▒     │    c c'  │   ▒               a gap that eight columns more can bridge. Otherwise the fill might
+//!        leaving   ┌──────────┐   entering        What leaves is harmless when what it touches inside the disc hangs
+//!            ░▒░   │          │  ▒                together without it: the cells to its right have no gap, or a gap
+//!            ▒     │    c c'  │   ▒               that a square of 8 × 8 cells can bridge. Otherwise the fill might
 //!            ░▒░   │          │  ▒                fall apart, and the disc is flooded afresh.
 //!                  └──────────┘
 //! ```
 //!
-//! Entering cells join when they touch the fill, and may open the way to more. Rows are bits ([`super::bit_window`]),
-//! so a flood afresh handles 64 cells a step.
+//! The fill itself is kept as the arcs through which its cells entered: cell (x, row) is bit `row` of `reach[x − half
+//! chord of the row]`. So what enters is one word, and what leaves is gathered from one word per length of chord.
 
-use super::bit_window::{BitPlanes, Row, and, or, shifted_left, shifted_right, span, spread};
+use super::arc_planes::{ArcPlanes, DiscShape};
+use super::bit_window::{
+    BitPlanes, Row, and, and_not, count, has, is_empty, or, set_bits, shifted_left, shifted_right, span,
+    spread,
+};
 use super::kernel_rows::KernelRows;
-
-/// Cells by which the planes of bits must reach beyond the map, on top of the disc's radius.
-pub(super) const MARGIN: usize = 12;
 
 /// Cells per side of the square in which a gap may be bridged.
 const BRIDGE: usize = 8;
+
+/// The leftmost column of that square.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 
 /// What a flood found at a centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Fill {
     /// Kernel mass of the connected free cells, in [0, 1].
     pub density: f32,
-    /// Unknown cells next to them, inside the disc.
-    pub num_unknown: u32,
+    /// How many of them have an unknown neighbour.
+    pub num_open: u32,
 }
 
-/// Leaving cells that lie one above the other, listed from the outside towards the disc's middle row.
-#[derive(Clone, Debug)]
-struct LeavingRun {
-    half_chord: usize,
-    rows: Vec<usize>,
-    /// The row after the last, where the disc is wider; none for the run on the middle row.
-    inner_row: Option<usize>,
-}
-
-/// A disc that slides along rows of centres; owns the scratch planes of one thread.
+/// A disc that slides along rows of centres; owns the scratch words of one thread.
 pub(super) struct DiscSweep<'a, const W: usize> {
     planes: &'a BitPlanes,
     kernel: &'a KernelRows,
-    runs: Vec<LeavingRun>,
-    /// Half chord of each row of the disc.
-    half_chords: Vec<usize>,
-    /// Free cells of the fill and unknown cells beside it, as bits of the rows that the disc covers.
-    reach: Vec<u64>,
-    touched: Vec<u64>,
-    /// First row of the disc, counted in rows of the planes.
+    shape: DiscShape<W>,
+    arcs: ArcPlanes<W>,
+    /// The fill, by the arcs through which its cells entered.
+    reach: Vec<Row<W>>,
+    /// The fill of the last flood afresh, row by row.
+    rows: Vec<Row<W>>,
+    /// First row of the disc and first column of the arcs, counted in padded cells.
     bottom: usize,
+    left: usize,
     num_reached: u32,
-    num_touched: u32,
+    num_open: u32,
     stack: Vec<(usize, usize)>,
 }
 
 impl<'a, const W: usize> DiscSweep<'a, W> {
-    /// A sweep of a kernel whose disc must fit into `64 W` columns.
+    /// A sweep of a kernel whose disc must fit into `64 W` rows and columns.
     pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
-        let radius = kernel.radius();
-        let half_chord = |row: usize| kernel.half_chord(row.abs_diff(radius)).unwrap_or(0);
-        let half_chords: Vec<usize> = (0..2 * radius + 1).map(half_chord).collect();
-        let num_words = half_chords.len() * planes.words_per_row();
+        let shape = DiscShape::new(kernel);
         Self {
             planes,
             kernel,
-            runs: leaving_runs(&half_chords),
-            half_chords,
-            reach: vec![0; num_words],
-            touched: vec![0; num_words],
+            rows: vec![[0; W]; shape.num_rows()],
+            shape,
+            arcs: ArcPlanes::default(),
+            reach: Vec::new(),
             bottom: 0,
+            left: 0,
             num_reached: 0,
-            num_touched: 0,
+            num_open: 0,
             stack: Vec::new(),
         }
     }
@@ -82,86 +77,103 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     /// Fills of the centres of a row from `column` on; None where the centre is not free.
     pub fn sweep(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
         let radius = self.kernel.radius();
+        let can_slide = self.kernel.is_uniform() && radius > 2;
         self.bottom = self.planes.padded(row) - radius;
-        self.clear();
+        self.left = self.planes.padded(column) - 2 * radius;
+        let num_arcs = fills.len() + 2 * radius + 1;
+        self.reach.clear();
+        self.reach.resize(num_arcs, [0; W]);
+        if can_slide {
+            self.arcs.cut(self.planes, &self.shape, (self.left, self.bottom), num_arcs);
+        }
         let mut was_free = false;
-        for (centre, fill) in (self.planes.padded(column)..).zip(fills) {
-            let is_free = self.is_free(radius, centre);
-            if is_free && !(was_free && radius > 2 && self.slide_to(centre)) {
-                self.flood(centre);
+        for (arc, fill) in (2 * radius..).zip(fills) {
+            let is_free = self.is_free(radius, self.left + arc);
+            if is_free && !(was_free && can_slide && self.slide_to(arc)) {
+                self.flood(arc, can_slide);
             }
-            *fill = is_free.then(|| self.read(centre));
+            *fill = is_free.then(|| self.read());
             was_free = is_free;
         }
     }
 
-    fn clear(&mut self) {
-        self.reach.fill(0);
-        self.touched.fill(0);
-        (self.num_reached, self.num_touched) = (0, 0);
-    }
-
-    /// Moves the disc from the centre on the left to `centre`; false when the fill might fall apart.
-    fn slide_to(&mut self, centre: usize) -> bool {
-        if !self.is_safe_to_leave(centre - 1) {
+    /// Moves the disc to the centre `arc` from the one on its left; false when the fill might fall apart.
+    fn slide_to(&mut self, arc: usize) -> bool {
+        let leaving = self.shape.leaving(&self.reach, arc - 1);
+        if !self.is_safe(&leaving, arc - 1) {
             return false;
         }
-        self.leave(centre - 1);
-        self.enter(centre);
+        self.num_reached -= count(&leaving);
+        self.num_open -= count(&and(&leaving, &self.arcs.leaving_open[arc - 1]));
+        self.enter(arc);
         true
     }
 
-    /// True when the fill stays in one piece without the cells that leave as the disc moves right from `centre`.
-    fn is_safe_to_leave(&self, centre: usize) -> bool {
-        for run in &self.runs {
-            let column = centre - run.half_chord;
-            // The last free cell to the right of the current stretch of leaving cells.
-            let mut last_free: Option<usize> = None;
-            let mut is_leaving = false;
-            for &row in &run.rows {
-                if !self.is_reached(row, column) {
-                    (last_free, is_leaving) = (None, false);
-                    continue;
-                }
-                is_leaving = true;
-                if self.is_free(row, column + 1) {
-                    if last_free
-                        .is_some_and(|last| last.abs_diff(row) > 1 && !self.is_bridged(last, row, column + 1))
-                    {
-                        return false;
-                    }
-                    last_free = Some(row);
-                }
-            }
-            if let (true, Some(inner), Some(last)) = (is_leaving, run.inner_row, last_free) {
-                // The cell below (or above) the run stays; it must hang together with the cells to the right.
-                let needs_bridge = self.is_reached(inner, column)
-                    && !(self.is_free(inner, column + 1)
-                        && (last.abs_diff(inner) == 1 || self.is_bridged(last, inner, column + 1)));
-                if needs_bridge {
-                    return false;
-                }
+    /// True when the fill stays in one piece as the reached cells `leaving` leave the disc around `arc`.
+    fn is_safe(&self, leaving: &Row<W>, arc: usize) -> bool {
+        let beside = and(&self.arcs.leaving_free[arc + 1], leaving);
+        let links = &self.shape.links;
+        // Free cells on the right that have a leaving cell below them but no free one beside that: the end of a gap.
+        let starts = and_not(&beside, &shifted_right(&and(&beside, links)));
+        let gap_ends = and(&starts, &shifted_right(&and(leaving, links)));
+        // Inner neighbours that stay, where the step over their corner is blocked.
+        let corner = and(&beside, &self.arcs.leaving_inner[arc + 1]);
+        let blocked = and_not(&and(leaving, &self.arcs.leaving_inner[arc]), &corner);
+        if is_empty(&gap_ends) && is_empty(&blocked) {
+            return true;
+        }
+        set_bits(&gap_ends).all(|row| self.is_gap_harmless(leaving, &beside, row, arc))
+            && set_bits(&blocked).all(|row| self.is_corner_harmless(leaving, &beside, row, arc))
+    }
+
+    /// True when the gap below a free cell is the run's end or can be bridged.
+    fn is_gap_harmless(&self, leaving: &Row<W>, beside: &Row<W>, row: usize, arc: usize) -> bool {
+        let mut lower = row;
+        while lower > 0 && has(&self.shape.links, lower - 1) && has(leaving, lower - 1) {
+            lower -= 1;
+            if has(beside, lower) {
+                return self.is_bridged(lower, row, self.left + arc + 1 - self.shape.half_chords[row]);
             }
         }
         true
     }
 
-    /// True when two free cells of a column hang together within the eight columns from it on and the rows between.
+    /// True when the inner neighbour of a leaving run touches the cells beside the run some other way.
+    fn is_corner_harmless(&self, leaving: &Row<W>, beside: &Row<W>, row: usize, arc: usize) -> bool {
+        let is_lower_half = row < self.kernel.radius();
+        let inner = if is_lower_half { row + 1 } else { row - 1 };
+        let column = self.left + arc - self.shape.half_chords[row];
+        let mut nearest = row;
+        loop {
+            if has(beside, nearest) {
+                return self.is_free(inner, column + 1) && self.is_bridged(nearest, inner, column + 1);
+            }
+            let outer = if is_lower_half { nearest.wrapping_sub(1) } else { nearest + 1 };
+            let is_linked = outer < self.shape.num_rows() && has(&self.shape.links, outer.min(nearest));
+            if !is_linked || !has(leaving, outer) {
+                return true;
+            }
+            nearest = outer;
+        }
+    }
+
+    /// True when two free cells of a column hang together within the eight columns from it on and the rows between
+    /// them and one beside, all of which the disc must hold.
     fn is_bridged(&self, first: usize, second: usize, column: usize) -> bool {
         let (low, high) = (first.min(second).saturating_sub(1), first.max(second) + 1);
-        let is_inside = high < self.half_chords.len()
-            && high - low < BRIDGE
-            && self.half_chords[low].min(self.half_chords[high]) >= BRIDGE
-            && self.half_chords[low].abs_diff(self.half_chords[high]) == 0;
-        if !is_inside {
+        if high >= self.shape.num_rows() || high - low >= BRIDGE {
             return false;
         }
         let mut board = 0u64;
+        let own = self.shape.half_chords[first].min(self.shape.half_chords[second]);
         for row in low..=high {
-            board |= self.planes.free_byte(self.bottom + row, column) << (BRIDGE * (row - low));
+            let half = self.shape.half_chords[row];
+            if half >= own && half >= BRIDGE {
+                board |= self.planes.free_byte(self.bottom + row, column) << (BRIDGE * (row - low));
+            }
         }
         let goal = 1u64 << (BRIDGE * (second - low));
-        let mut reached = 1u64 << (BRIDGE * (first - low));
+        let mut reached = 1u64 << (BRIDGE * (first - low)) & board;
         loop {
             let sideways = (reached << 1 & !FIRST_COLUMN) | (reached >> 1 & !(FIRST_COLUMN << (BRIDGE - 1)));
             let next = (reached | sideways | reached << BRIDGE | reached >> BRIDGE) & board;
@@ -172,220 +184,85 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         }
     }
 
-    /// Takes the left arc of the disc around `centre` out of the fill.
-    fn leave(&mut self, centre: usize) {
-        for row in 0..self.half_chords.len() {
-            let column = centre - self.half_chords[row];
-            let (word, bit) = self.place(row, column);
-            self.num_reached -= u32::from(self.reach[word] & bit != 0);
-            self.num_touched -= u32::from(self.touched[word] & bit != 0);
-            self.reach[word] &= !bit;
-            self.touched[word] &= !bit;
-        }
-        if self.num_touched > 0 {
-            self.untouch(centre);
-        }
-    }
-
-    /// Unknown cells beside the left arc may have lost their last neighbour in the fill.
-    fn untouch(&mut self, centre: usize) {
-        for row in 0..self.half_chords.len() {
-            let column = centre - self.half_chords[row];
-            let beside = [(row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
-            for (row, column) in beside {
-                if row < self.half_chords.len()
-                    && self.is_touched(row, column)
-                    && !self.touches_reach(row, column)
-                {
-                    let (word, bit) = self.place(row, column);
-                    self.touched[word] &= !bit;
-                    self.num_touched -= 1;
-                }
+    /// Takes the right arc of the disc around `arc` into the fill, and whatever hangs on it.
+    fn enter(&mut self, arc: usize) {
+        let free = self.arcs.entering_free[arc];
+        let (reached_inside, free_inside) = self.shape.inner(&self.reach, &self.arcs.entering_free, arc);
+        let on_left = self.reach[arc - 1];
+        let mut joined = and(&free, &or(&on_left, &reached_inside));
+        loop {
+            let links = &self.shape.links;
+            let beside = or(&shifted_right(&and(&joined, links)), &and(&shifted_left(&joined), links));
+            let more = and_not(&and(&free, &beside), &joined);
+            if is_empty(&more) {
+                break;
             }
+            joined = or(&joined, &more);
         }
-    }
-
-    /// Takes the right arc of the disc around `centre` into the fill.
-    fn enter(&mut self, centre: usize) {
-        let last_row = self.half_chords.len() - 1;
-        for row in 0..=last_row {
-            let column = centre + self.half_chords[row];
-            let (word, bit) = self.place(row, column);
-            if self.planes.free_word(self.bottom + row, column) & bit != 0 && self.is_reached(row, column - 1)
-            {
-                self.reach[word] |= bit;
-                self.num_reached += 1;
-            }
+        self.reach[arc] = joined;
+        self.num_reached += count(&joined);
+        self.num_open += count(&and(&joined, &self.arcs.entering_open[arc]));
+        let missed_left = and_not(&self.arcs.entering_free[arc - 1], &on_left);
+        let missed = or(&missed_left, &and_not(&free_inside, &reached_inside));
+        for row in set_bits(&and(&joined, &missed)) {
+            self.stack.push((row, self.left + arc + self.shape.half_chords[row]));
         }
-        for row in 0..=last_row {
-            let column = centre + self.half_chords[row];
-            if self.is_free(row, column) {
-                self.enter_free(row, column, centre);
-            } else if self.planes.is_unknown(self.bottom + row, column) {
-                self.touch_if_beside_reach(row, column);
-            }
-        }
-    }
-
-    /// Follows an entering free cell to whatever hangs on it.
-    fn enter_free(&mut self, row: usize, column: usize, centre: usize) {
-        let above_and_below = [row.wrapping_sub(1), row + 1];
-        if !self.is_reached(row, column) {
-            let hangs_on = above_and_below
-                .iter()
-                .any(|&other| other < self.half_chords.len() && self.is_reached(other, column));
-            if !hangs_on {
-                return;
-            }
-            self.reach_cell(row, column);
-        }
-        let leads_on = |sweep: &Self, row: usize, column: usize| {
-            row < sweep.half_chords.len()
-                && sweep.is_inside(row, column, centre)
-                && !sweep.is_reached(row, column)
-                && !sweep.is_touched(row, column)
-                && !sweep.planes.is_occupied(sweep.bottom + row, column)
-        };
-        let is_open = leads_on(self, row, column - 1)
-            || above_and_below.iter().any(|&other| leads_on(self, other, column));
-        if is_open {
-            self.stack.push((row, column));
-            self.flood_on(centre);
-        }
+        self.flood_on(arc);
     }
 
     /// Spreads from the cells on the stack, cell by cell.
-    fn flood_on(&mut self, centre: usize) {
+    fn flood_on(&mut self, arc: usize) {
+        let centre = self.left + arc;
         while let Some((row, column)) = self.stack.pop() {
-            let around =
-                [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)];
-            for (row, column) in around {
-                if row >= self.half_chords.len()
-                    || !self.is_inside(row, column, centre)
-                    || self.is_reached(row, column)
-                {
+            for (row, column) in
+                [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)]
+            {
+                if row >= self.shape.num_rows() || column.abs_diff(centre) > self.shape.half_chords[row] {
                     continue;
                 }
-                if self.is_free(row, column) {
-                    self.reach_cell(row, column);
+                let entered = column - self.shape.half_chords[row] - self.left;
+                if self.is_free(row, column) && !has(&self.reach[entered], row) {
+                    self.reach[entered][row / 64] |= 1 << (row % 64);
+                    self.num_reached += 1;
+                    self.num_open += u32::from(self.planes.is_open(self.bottom + row, column));
                     self.stack.push((row, column));
-                } else if self.planes.is_unknown(self.bottom + row, column) {
-                    self.touch_if_beside_reach(row, column);
                 }
             }
         }
     }
 
-    /// Floods the disc around `centre` from nothing.
-    fn flood(&mut self, centre: usize) {
+    /// Floods the disc around `arc` from nothing; `keeps` says whether the disc may slide on.
+    fn flood(&mut self, arc: usize, keeps: bool) {
         let radius = self.kernel.radius();
-        let left = centre - radius;
-        let num_rows = self.half_chords.len();
-        let mut masks = vec![[0; W]; num_rows];
-        let mut reach = vec![[0; W]; num_rows];
-        for (row, mask) in masks.iter_mut().enumerate() {
-            *mask = and(&self.planes.free_row(self.bottom + row, left), &self.disc_row(row));
-        }
-        reach[radius] = span(radius as i64, radius as i64);
-        settle(&mut reach, &masks, radius);
-        self.clear();
-        let mut before = [0; W];
-        for row in 0..num_rows {
-            let after = reach.get(row + 1).copied().unwrap_or([0; W]);
-            let beside =
-                or(&or(&before, &after), &or(&shifted_left(&reach[row]), &shifted_right(&reach[row])));
-            let unknown = and(&self.planes.unknown_row(self.bottom + row, left), &self.disc_row(row));
-            let touched = and(&beside, &unknown);
-            let start = row * self.planes.words_per_row();
-            self.num_reached += write_row(&mut self.reach[start..], left, &reach[row]);
-            self.num_touched += write_row(&mut self.touched[start..], left, &touched);
-            before = reach[row];
+        let left = self.left + arc - radius;
+        let disc = |row: usize, bits: Row<W>| and(&bits, &self.shape.disc[row]);
+        let masks: Vec<Row<W>> = (0..self.shape.num_rows())
+            .map(|row| disc(row, self.planes.free_row(self.bottom + row, left)))
+            .collect();
+        self.rows.fill([0; W]);
+        self.rows[radius] = span(radius as i64, radius as i64);
+        settle(&mut self.rows, &masks, radius);
+        self.num_reached = self.rows.iter().map(count).sum();
+        let open = |(row, reached): (usize, &Row<W>)| {
+            count(&and(reached, &self.planes.open_row(self.bottom + row, left)))
+        };
+        self.num_open = self.rows.iter().enumerate().map(open).sum();
+        if keeps {
+            self.shape.by_arcs(&self.rows, &mut self.reach[arc - 2 * radius..=arc]);
         }
     }
 
-    fn disc_row(&self, row: usize) -> Row<W> {
-        let (radius, half) = (self.kernel.radius() as i64, self.half_chords[row] as i64);
-        span(radius - half, radius + half)
-    }
-
-    /// Kernel mass and unknown neighbours of the fill around `centre`.
-    fn read(&self, centre: usize) -> Fill {
-        let density = self.kernel.mass_of_count(self.num_reached).unwrap_or_else(|| {
-            let left = centre - self.kernel.radius();
-            let words = self.planes.words_per_row();
-            let rows = (0..self.half_chords.len()).map(|row| read_row::<W>(&self.reach[row * words..], left));
-            self.kernel.mass(rows)
-        });
-        Fill { density, num_unknown: self.num_touched }
-    }
-
-    fn place(&self, row: usize, column: usize) -> (usize, u64) {
-        (row * self.planes.words_per_row() + column / 64, 1 << (column % 64))
-    }
-
-    fn is_inside(&self, row: usize, column: usize, centre: usize) -> bool {
-        column.abs_diff(centre) <= self.half_chords[row]
+    fn read(&self) -> Fill {
+        let density = self
+            .kernel
+            .mass_of_count(self.num_reached)
+            .unwrap_or_else(|| self.kernel.mass(self.rows.iter().copied()));
+        Fill { density, num_open: self.num_open }
     }
 
     fn is_free(&self, row: usize, column: usize) -> bool {
-        self.planes.free_word(self.bottom + row, column) >> (column % 64) & 1 == 1
+        self.planes.is_free(self.bottom + row, column)
     }
-
-    fn is_reached(&self, row: usize, column: usize) -> bool {
-        let (word, bit) = self.place(row, column);
-        self.reach[word] & bit != 0
-    }
-
-    fn is_touched(&self, row: usize, column: usize) -> bool {
-        let (word, bit) = self.place(row, column);
-        self.touched[word] & bit != 0
-    }
-
-    fn touches_reach(&self, row: usize, column: usize) -> bool {
-        self.is_reached(row, column - 1)
-            || self.is_reached(row, column + 1)
-            || (row > 0 && self.is_reached(row - 1, column))
-            || (row + 1 < self.half_chords.len() && self.is_reached(row + 1, column))
-    }
-
-    fn reach_cell(&mut self, row: usize, column: usize) {
-        let (word, bit) = self.place(row, column);
-        self.reach[word] |= bit;
-        self.num_reached += 1;
-    }
-
-    fn touch_if_beside_reach(&mut self, row: usize, column: usize) {
-        if !self.is_touched(row, column) && self.touches_reach(row, column) {
-            let (word, bit) = self.place(row, column);
-            self.touched[word] |= bit;
-            self.num_touched += 1;
-        }
-    }
-}
-
-/// The leftmost column of a square of 8 × 8 cells.
-const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
-
-/// The left arc as runs of equal half chord, each from the outside inwards.
-fn leaving_runs(half_chords: &[usize]) -> Vec<LeavingRun> {
-    let middle = half_chords.len() / 2;
-    let mut runs = Vec::new();
-    let mut first = 0;
-    while first < half_chords.len() {
-        let half_chord = half_chords[first];
-        let len = half_chords[first..].iter().take_while(|&&half| half == half_chord).count();
-        let rows: Vec<usize> = (first..first + len).collect();
-        let run = match (rows.contains(&middle), first < middle) {
-            (true, _) => LeavingRun { half_chord, rows, inner_row: None },
-            (false, true) => LeavingRun { half_chord, rows, inner_row: Some(first + len) },
-            (false, false) => {
-                LeavingRun { half_chord, rows: rows.into_iter().rev().collect(), inner_row: Some(first - 1) }
-            }
-        };
-        runs.push(run);
-        first += len;
-    }
-    runs
 }
 
 /// Floods `reach` within `masks`, by alternating passes until one changes nothing; starts at the `middle` row.
@@ -422,30 +299,6 @@ fn grow<const W: usize>(
     *reach
 }
 
-/// Writes a window's row into a row of words from a column on; returns the number of set bits.
-fn write_row<const W: usize>(words: &mut [u64], column: usize, row: &Row<W>) -> u32 {
-    let (first, shift) = (column / 64, column % 64);
-    let mut num_set = 0;
-    for (word, &bits) in row.iter().enumerate() {
-        num_set += bits.count_ones();
-        words[first + word] |= bits << shift;
-        if shift > 0 && bits >> (64 - shift) != 0 {
-            words[first + word + 1] |= bits >> (64 - shift);
-        }
-    }
-    num_set
-}
-
-/// `64 W` bits of a row of words from a column on.
-fn read_row<const W: usize>(words: &[u64], column: usize) -> Row<W> {
-    let (first, shift) = (column / 64, column % 64);
-    std::array::from_fn(|word| {
-        let low = words[first + word] >> shift;
-        let high = words.get(first + word + 1).copied().unwrap_or(0);
-        if shift == 0 { low } else { low | high << (64 - shift) }
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use std::collections::{HashSet, VecDeque};
@@ -455,6 +308,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::Point2;
+    use crate::localization::arc_planes::margin;
     use crate::localization::grid_map::{CellState, GridMap};
     use crate::localization::kernel_rows::KernelProfile;
 
@@ -469,7 +323,7 @@ mod tests {
             let d = (dx as f64).hypot(dy as f64);
             whole += if d < h { profile.height(d, h) } else { 0.0 };
         }
-        let mut num_unknown = 0;
+        let mut num_open = 0;
         let mut seen = HashSet::from([centre]);
         let mut queue = VecDeque::from([centre]);
         while let Some((x, y)) = queue.pop_front() {
@@ -477,20 +331,15 @@ mod tests {
             if d >= h {
                 continue;
             }
-            match map.state(x, y) {
-                CellState::Free => mass += profile.height(d, h),
-                CellState::Unknown => num_unknown += 1,
-                CellState::Occupied => {}
+            if map.state(x, y) != CellState::Free {
+                continue;
             }
-            if map.state(x, y) == CellState::Free {
-                queue.extend(
-                    [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-                        .iter()
-                        .filter(|&&cell| seen.insert(cell)),
-                );
-            }
+            mass += profile.height(d, h);
+            let around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
+            num_open += u32::from(around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown));
+            queue.extend(around.iter().filter(|&&cell| seen.insert(cell)));
         }
-        Some(Fill { density: (mass / whole) as f32, num_unknown })
+        Some(Fill { density: (mass / whole) as f32, num_open })
     }
 
     /// Rooms with doors and clutter, and a part nobody has seen.
@@ -536,7 +385,7 @@ mod tests {
             for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
                 let map = random_building(&mut rng, width, height);
                 let kernel = KernelRows::new(profile, h);
-                let planes = BitPlanes::new(&map, kernel.radius() + MARGIN);
+                let planes = BitPlanes::new(&map, margin(&kernel));
                 let fills = sweep_all(&map, &planes, &kernel);
                 for (cell, fast) in fills.iter().enumerate() {
                     let cell = ((cell % width) as i64, (cell / width) as i64);
@@ -545,7 +394,7 @@ mod tests {
                     }
                     match (fast, literal_fill(&map, cell, profile, h)) {
                         (Some(fast), Some(slow)) => {
-                            assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
+                            assert_eq!(fast.num_open, slow.num_open, "h {h} at {cell:?}");
                             assert!(
                                 (fast.density - slow.density).abs() < 1e-5,
                                 "{fast:?} {slow:?} h {h} at {cell:?}"

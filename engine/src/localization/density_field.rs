@@ -11,8 +11,9 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::arc_planes::margin;
 use super::bit_window::BitPlanes;
-use super::connected_disc::{DiscSweep, Fill, MARGIN};
+use super::connected_disc::{DiscSweep, Fill};
 use super::density_gradient::{GradientConfig, stable_descent};
 use super::grid_map::{CellState, GridMap};
 use super::kernel_rows::{KernelProfile, KernelRows};
@@ -41,7 +42,8 @@ pub struct DensityFieldConfig {
     pub profile: KernelProfile,
     /// Bandwidth of each kernel, metres; one to four (thesis 3.3.2.2: 15, 30 and 50 cells of 0.1 m).
     pub bandwidths_m: Vec<f64>,
-    /// Unknown cells that a flood may touch and still be hard, as a share of the kernel's perimeter; 0 is literal.
+    /// Reached cells that may border on unknown ones while the density is still hard, as a share of the kernel's
+    /// perimeter; 0 is literal.
     pub unknown_tolerance: f64,
     /// Where the gradient counts.
     pub gradient: GradientConfig,
@@ -247,7 +249,7 @@ fn kernel_codes(map: &GridMap, config: &DensityFieldConfig, bandwidth_m: f64) ->
 /// Hard density of every cell for one kernel, NaN where it is undefined or the cell is not free.
 fn hard_densities(map: &GridMap, config: &DensityFieldConfig, bandwidth_cells: f64) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
-    let planes = BitPlanes::new(map, kernel.radius() + MARGIN);
+    let planes = BitPlanes::new(map, margin(&kernel));
     let width = map.width();
     let mut densities = vec![f32::NAN; width * map.height()];
     densities.par_chunks_mut(width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
@@ -294,9 +296,9 @@ fn sweep_by<const W: usize>(
 impl DensityFieldConfig {
     /// The density of a fill when it is hard, else NaN.
     fn hard_density(&self, fill: &Option<Fill>, bandwidth_cells: f64) -> f32 {
-        let most_unknown = self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells;
+        let most_open = self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells;
         match fill {
-            Some(fill) if f64::from(fill.num_unknown) <= most_unknown => fill.density.min(1.0),
+            Some(fill) if f64::from(fill.num_open) <= most_open => fill.density.min(1.0),
             _ => f32::NAN,
         }
     }
@@ -344,7 +346,7 @@ fn densities_around(
     cell: (i64, i64),
 ) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
-    let planes = BitPlanes::new(map, kernel.radius() + MARGIN);
+    let planes = BitPlanes::new(map, margin(&kernel));
     let half = AROUND as i64 / 2;
     let fills = sweep(&planes, &kernel, (cell.0 - half, cell.1 - half), (AROUND, AROUND));
     fills.iter().map(|fill| config.hard_density(fill, bandwidth_cells)).collect()

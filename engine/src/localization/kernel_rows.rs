@@ -76,6 +76,11 @@ impl KernelRows {
         self.radius
     }
 
+    /// True when all cells weigh the same.
+    pub const fn is_uniform(&self) -> bool {
+        self.is_uniform
+    }
+
     /// Half the chord `dy` rows from the centre; None outside the disc.
     pub fn half_chord(&self, dy: usize) -> Option<usize> {
         self.half_chords.get(dy).copied().flatten()
