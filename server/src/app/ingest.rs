@@ -31,6 +31,22 @@ pub struct NewBatch {
     pub scans: Vec<Scan>,
 }
 
+impl NewBatch {
+    /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
+    pub(super) fn checked(
+        mut self,
+        geometry: &ScanGeometry,
+        num_known: usize,
+        before: Option<Pose2>,
+        step_max_m: f64,
+    ) -> Result<Vec<Scan>, AppError> {
+        check_readings(&mut self.scans, geometry)?;
+        let num_known = num_known.min(self.scans.len());
+        check_odometry(&self.scans, num_known, before, step_max_m)?;
+        Ok(self.scans.split_off(num_known))
+    }
+}
+
 impl App {
     /// Appends a batch to a run; the answer means that it would survive a power cut.
     ///

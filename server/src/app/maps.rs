@@ -15,7 +15,7 @@ use super::series;
 use super::site::Site;
 use super::{App, AppError};
 use crate::storage::keys::{Key, MapVersion, RunIdx};
-use crate::storage::{Batch, Reader, StorageError, codec};
+use crate::storage::{Batch, StorageError, codec};
 
 /// Poses stand under this kind of map part.
 const POSES: u8 = 1;

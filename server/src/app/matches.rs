@@ -11,7 +11,7 @@ use super::maps::MapRecord;
 use super::series;
 use super::site::Site;
 use crate::storage::keys::Key;
-use crate::storage::{Reader, StorageError, codec};
+use crate::storage::{StorageError, codec};
 
 /// A match with its number.
 #[derive(Clone, Debug)]

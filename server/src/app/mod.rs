@@ -11,7 +11,7 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use locution_engine::localization::GridMap;
+use locution_engine::localization::{GridMap, ServedMap};
 use lru::LruCache;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
@@ -24,6 +24,7 @@ pub mod exports;
 mod grids;
 mod ingest;
 mod jobs;
+pub mod localisations;
 pub mod maps;
 pub mod matches;
 mod names;
@@ -50,6 +51,7 @@ pub use site::{Site, SiteInfo, SiteState, TextConfig};
 pub use trajectory::{Frame, StampedPose, Trajectory};
 
 use grids::GridKey;
+use localisations::Localisations;
 use open_runs::OpenRuns;
 
 /// Grids kept in memory; each has at most 64 million cells of one byte.
@@ -67,6 +69,8 @@ pub struct App {
     open_runs: OpenRuns,
     grids: Mutex<LruCache<GridKey, Arc<GridMap>>>,
     drawing: tokio::sync::Mutex<()>,
+    served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
+    localisations: Localisations,
 }
 
 impl App {
@@ -78,6 +82,8 @@ impl App {
             open_runs: OpenRuns::new(config.limits.num_open_runs_max),
             grids: Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             drawing: tokio::sync::Mutex::default(),
+            served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
+            localisations: Localisations::default(),
             config,
             storage,
             sites: Mutex::default(),

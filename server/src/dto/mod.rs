@@ -3,6 +3,7 @@
 pub mod batches;
 pub mod common;
 pub mod jobs;
+pub mod localisations;
 pub mod maps;
 pub mod runs;
 pub mod sites;

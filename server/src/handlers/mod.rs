@@ -3,6 +3,7 @@
 pub mod batches;
 pub mod encodings;
 pub mod jobs;
+pub mod localisations;
 pub mod maps;
 pub mod matches;
 pub mod operations;
