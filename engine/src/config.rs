@@ -7,9 +7,9 @@ use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
 use crate::matching::MatchingConfig;
 use crate::registration::RegistrationConfig;
+use crate::retrieval::RetrievalConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
-use crate::retrieval::RetrievalConfig;
 
 /// A configuration value that cannot work.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -51,7 +51,8 @@ impl EngineConfig {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
         self.registration.validate("registration")?;
-        self.retrieval.validate("retrieval")
+        self.retrieval.validate("retrieval")?;
+        Ok(())
     }
 }
 

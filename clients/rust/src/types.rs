@@ -86,7 +86,7 @@ pub struct RunStatus {
     /// Its name.
     pub run: String,
     /// The robot that recorded it.
-    pub robot: String,
+    pub robot: Option<String>,
     /// `open` or `finished`.
     pub state: String,
     /// Sequence number that the next scan must have.

@@ -12,6 +12,66 @@ use crate::geometry::Pose2;
 pub struct RegistrationConfig {
     /// Scan against recent scans.
     pub refiner: RefinerConfig,
+    /// Submap against submap.
+    pub submap: SubmapConfig,
+}
+
+/// Settings of [`Submap`](super::Submap) and [`register`](super::register).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SubmapConfig {
+    /// Free space and search reach this far from the anchor, metres.
+    pub radius_m: f64,
+    /// Returns farther than this from the robot are not used, metres.
+    pub range_limit_m: f64,
+    /// Returns of a sweep are thinned to this distance, metres.
+    pub point_spacing_m: f64,
+    /// At most this many returns of a scan are used.
+    pub max_points: usize,
+    /// Edge of a surface cell, metres.
+    pub cell_m: f64,
+    /// Edge of a cell of free space and of the search, metres.
+    pub evidence_cell_m: f64,
+    /// Distance between the points that are aligned, metres.
+    pub fine_spacing_m: f64,
+    /// Distance between the points that are searched with, metres.
+    pub coarse_spacing_m: f64,
+    /// Step of the heading in the search, radians.
+    pub turn_step_rad: f64,
+    /// Expected distance of a return from its surface, metres.
+    pub noise_m: f64,
+    /// Beyond about this distance a return is an outlier, metres.
+    pub outlier_m: f64,
+    /// The same at the first step of the alignment, metres.
+    pub first_outlier_m: f64,
+    /// Points that a surface must rest on.
+    pub min_count: i32,
+    /// Gauss-Newton steps at most.
+    pub max_iterations: usize,
+    /// This many returns count as one independent measurement.
+    pub correlated_returns: f64,
+}
+
+impl Default for SubmapConfig {
+    fn default() -> Self {
+        Self {
+            radius_m: 12.0,
+            range_limit_m: 25.0,
+            point_spacing_m: 0.08,
+            max_points: 180,
+            cell_m: 0.2,
+            evidence_cell_m: 0.1,
+            fine_spacing_m: 0.1,
+            coarse_spacing_m: 0.4,
+            turn_step_rad: 0.02,
+            noise_m: 0.03,
+            outlier_m: 0.15,
+            first_outlier_m: 0.3,
+            min_count: 4,
+            max_iterations: 10,
+            correlated_returns: 10.0,
+        }
+    }
 }
 
 /// How far wheel odometry is trusted.
@@ -142,7 +202,36 @@ impl RegistrationConfig {
     /// # Errors
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        self.refiner.validate(&format!("{path}.refiner"))
+        self.refiner.validate(&format!("{path}.refiner"))?;
+        self.submap.validate(&format!("{path}.submap"))
+    }
+}
+
+impl SubmapConfig {
+    /// Checks every value; `path` is this struct's own path.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        let positive = [
+            ("radius_m", self.radius_m),
+            ("range_limit_m", self.range_limit_m),
+            ("cell_m", self.cell_m),
+            ("evidence_cell_m", self.evidence_cell_m),
+            ("fine_spacing_m", self.fine_spacing_m),
+            ("coarse_spacing_m", self.coarse_spacing_m),
+            ("turn_step_rad", self.turn_step_rad),
+            ("noise_m", self.noise_m),
+            ("outlier_m", self.outlier_m),
+            ("first_outlier_m", self.first_outlier_m),
+            ("correlated_returns", self.correlated_returns),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
+            }
+        }
+        Ok(())
     }
 }
 

@@ -4,7 +4,7 @@ use crate::geometry::{Point2, Pose2};
 
 /// The poses to try around a start.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct SearchWindow {
+pub(crate) struct LocalWindow {
     /// Half width along x, metres.
     pub half_x_m: f64,
     /// Half width along y, metres.
@@ -50,7 +50,7 @@ impl LikelihoodGrid {
 
     /// The best-scoring pose of the window around `start`; ties go to the pose nearest to the start in search order.
     /// None when no return lies on the grid.
-    pub fn best_pose(&self, points: &[Point2], start: &Pose2, window: &SearchWindow) -> Option<Pose2> {
+    pub fn best_pose(&self, points: &[Point2], start: &Pose2, window: &LocalWindow) -> Option<Pose2> {
         let near: Vec<&Point2> =
             points.iter().filter(|point| point.x.hypot(point.y) <= self.reach_m).collect();
         let farthest_m = near.iter().map(|point| point.x.hypot(point.y)).fold(0.0f64, f64::max);

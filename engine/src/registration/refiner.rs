@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use super::config::RefinerConfig;
-use super::correlative::{LikelihoodGrid, SearchWindow};
+use super::correlative::{LikelihoodGrid, LocalWindow};
 use super::point_to_line::{Alignment, AlignmentSettings, align};
 use super::points::{thinned_points, transformed};
 use super::surface_map::SurfaceMap;
@@ -179,7 +179,7 @@ impl OdometryRefiner {
                 grid.mark(&from_millimetres(*point));
             }
         }
-        let window = SearchWindow {
+        let window = LocalWindow {
             half_x_m: config.search_half_m,
             half_y_m: config.search_half_m,
             half_turn_rad: config.search_half_turn_rad,

@@ -19,7 +19,6 @@ use super::run_writer::{RunWriter, WriterState};
 use super::runs::RunInfo;
 use super::scans::{append_scans, find_receipt, is_same_scan, read_scans};
 use super::site::Site;
-use super::translation::Translated;
 use super::{App, AppError, Name, on_blocking_thread};
 use crate::storage::Batch;
 
@@ -104,7 +103,8 @@ impl App {
     ) -> Result<Receipt, AppError> {
         let num_scans_max = self.config().limits.num_scans_per_batch_max;
         if batch.scans.len() > num_scans_max {
-            let problem = format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
+            let problem =
+                format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
             return Err(AppError::invalid("scans", problem));
         }
         let geometry = &writer.run.geometry;
@@ -138,8 +138,10 @@ fn check_readings(scans: &mut [Scan], geometry: &ScanGeometry) -> Result<(), App
     for (scan_idx, scan) in scans.iter_mut().enumerate() {
         let num_ranges = scan.ranges_m.len();
         if num_ranges != geometry.num_ranges {
-            let problem =
-                format!("scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}", geometry.num_ranges);
+            let problem = format!(
+                "scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}",
+                geometry.num_ranges
+            );
             return Err(AppError::invalid_scan(format!("scans[{scan_idx}].ranges_m"), problem));
         }
         for range_m in &mut scan.ranges_m {
@@ -230,10 +232,10 @@ async fn append_fresh(
     let run = writer.idx;
     let mut translator = state.take_translator()?;
     let (translator, scans, translated) = on_blocking_thread(move || {
-        let mut translated = Translated::default();
-        translator.translate(&scans, &mut translated).map(|()| (translator, scans, translated))
+        let translated = translator.translate(&scans);
+        (translator, scans, translated)
     })
-    .await??;
+    .await?;
     state.translator = Some(translator);
     let translated_s = started.elapsed().as_secs_f64();
     let mut batch = Batch::default();
@@ -259,12 +261,8 @@ async fn append_fresh(
 
 /// Stores the tail of a text. A finished run needs no translator again, so the stored one goes.
 async fn finish(site: &Site, writer: &RunWriter, state: &mut WriterState) -> Result<(), AppError> {
-    let mut translator = state.take_translator()?;
-    let translated = on_blocking_thread(move || {
-        let mut translated = Translated::default();
-        translator.finish(&mut translated).map(|()| translated)
-    })
-    .await??;
+    let translator = state.take_translator()?;
+    let translated = on_blocking_thread(move || translator.finish()).await?;
     let mut batch = Batch::default();
     state.append_text(writer.idx, &translated, &mut batch);
     state.head.value.is_finished = true;

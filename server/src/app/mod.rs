@@ -33,7 +33,7 @@ pub use error::AppError;
 pub use ingest::NewBatch;
 pub use names::Name;
 pub use runs::{NewRun, RunInfo};
-pub use site::{Site, SiteInfo};
+pub use site::{Site, SiteInfo, SiteState, TextConfig};
 pub use trajectory::{Frame, StampedPose, Trajectory};
 
 use open_runs::OpenRuns;

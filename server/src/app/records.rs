@@ -15,6 +15,8 @@ pub struct SiteRecord {
     pub num_runs: RunIdx,
     /// The text generation that serves.
     pub generation: Generation,
+    /// The partition of densities of that generation, as JSON, when it is not the configured one.
+    pub quantizer_json: Option<String>,
     /// The map version that serves; 0 before the first build.
     pub map_version: MapVersion,
     /// The number of the next job.

@@ -9,13 +9,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
-use locution_engine::config::EngineConfig;
 use tokio::sync::{Mutex, Semaphore, SemaphorePermit};
 
 use super::records::{RunHead, StoredKeyframe, StoredRun, TextHead};
 use super::scans::read_scans;
 use super::series;
-use super::site::Site;
+use super::site::{Site, TextConfig};
 use super::translation::{RunTranslator, Translated};
 use super::{AppError, on_blocking_thread};
 use crate::storage::keys::{Generation, Key, RunIdx};
@@ -39,7 +38,6 @@ pub struct RunWriter {
 /// What the writer knows of the run; equal to what is stored.
 pub struct WriterState {
     pub(super) generation: Generation,
-    pub(super) config: Arc<EngineConfig>,
     pub(super) head: Stored<RunHead>,
     pub(super) text: Stored<TextHead>,
     /// None while it works elsewhere, and once the run is finished.
@@ -92,7 +90,7 @@ impl RunWriter {
     /// Reads the heads and brings the translator to where the stored text ends.
     pub(super) async fn load(&self, site: &Site) -> Result<WriterState, AppError> {
         let state = site.state();
-        self.load_generation(&**site.store(), state.record.generation, Arc::clone(&state.config)).await
+        self.load_generation(&**site.store(), state.record.generation, &state.text_config()?).await
     }
 
     /// The same for a generation that does not serve yet.
@@ -100,46 +98,52 @@ impl RunWriter {
         &self,
         reader: &dyn Reader,
         generation: Generation,
-        config: Arc<EngineConfig>,
+        text_config: &TextConfig,
     ) -> Result<WriterState, AppError> {
         let head = Stored::<RunHead>::load(reader, &Key::RunHead(self.idx)).await?;
         let text = Stored::<TextHead>::load(reader, &Key::TextHead(generation, self.idx)).await?;
         if text.value.is_finished {
-            return Ok(WriterState { generation, config, head, text, translator: None });
+            return Ok(WriterState { generation, head, text, translator: None });
         }
-        let mut translator = self.load_checkpoint(reader, generation, &config, &text.value).await?;
+        let mut translator = self.load_checkpoint(reader, generation, text_config, &text.value).await?;
         let mut next = text.value.checkpoint_scans;
         while next < text.value.num_scans {
             let end = text.value.num_scans.min(next + NUM_SCANS_PER_REPLAY);
             let scans = read_scans(reader, self.idx, &self.run.geometry, next..end).await?;
             translator = on_blocking_thread(move || {
                 // What these scans produced is already stored.
-                translator.translate(&scans, &mut Translated::default()).map(|()| translator)
+                translator.translate(&scans);
+                translator
             })
-            .await??;
+            .await?;
             next = end;
         }
-        Ok(WriterState { generation, config, head, text, translator: Some(translator) })
+        Ok(WriterState { generation, head, text, translator: Some(translator) })
     }
 
     async fn load_checkpoint(
         &self,
         reader: &dyn Reader,
         generation: Generation,
-        config: &Arc<EngineConfig>,
+        text_config: &TextConfig,
         text: &TextHead,
     ) -> Result<RunTranslator, AppError> {
         if text.num_checkpoint_parts == 0 {
-            return RunTranslator::new(config, &self.run.geometry);
+            return RunTranslator::new(
+                &text_config.engine,
+                &self.run.geometry,
+                text_config.quantizer.clone(),
+            );
         }
         let key = |part| Key::Checkpoint(generation, self.idx, part).encode();
         let parts = reader.multi_get(&(0..text.num_checkpoint_parts).map(key).collect::<Vec<_>>()).await?;
         let mut bytes = Vec::new();
         for part in parts {
-            let missing = || StorageError::Corrupt { what: "a part of a stored translator is missing".into() };
+            let missing =
+                || StorageError::Corrupt { what: "a part of a stored translator is missing".into() };
             bytes.extend(codec::decode::<Vec<u8>>(&part.ok_or_else(missing)?, "a stored translator")?);
         }
-        RunTranslator::restore(config, &self.run.geometry, &bytes)
+        RunTranslator::restore(&bytes)
     }
 }
 
@@ -155,7 +159,8 @@ impl WriterState {
         let observations = &translated.observations;
         series::append(batch, observations, text.num_observations, |n| Key::Observations(generation, run, n));
         text.num_observations += observations.len() as u64;
-        let num_levels = translated.words.iter().map(|word| usize::from(word.id.level) + 1).max().unwrap_or(0);
+        let num_levels =
+            translated.words.iter().map(|word| usize::from(word.id.level) + 1).max().unwrap_or(0);
         text.num_words.resize(num_levels.max(text.num_words.len()), 0);
         for level in 0..num_levels {
             let words: Vec<_> =
@@ -192,7 +197,10 @@ impl WriterState {
         let bytes = translator.ok_or_else(|| AppError::internal("no translator to store"))?.store()?;
         let mut num_parts = 0u32;
         for part in bytes.chunks(CHECKPOINT_PART_BYTES) {
-            batch.put(Key::Checkpoint(self.generation, run, num_parts).encode(), codec::encode(&part.to_vec()));
+            batch.put(
+                Key::Checkpoint(self.generation, run, num_parts).encode(),
+                codec::encode(&part.to_vec()),
+            );
             num_parts += 1;
         }
         for stale in num_parts..text.num_checkpoint_parts {

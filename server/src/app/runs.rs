@@ -7,6 +7,7 @@ use locution_engine::scan::ScanGeometry;
 use super::records::{RunHead, StoredRun, TextHead};
 use super::run_writer::RunWriter;
 use super::site::Site;
+use super::translation::RunTranslator;
 use super::{App, AppError, Name};
 use crate::storage::keys::{Key, RunIdx};
 use crate::storage::{Reader, StorageError, codec};
@@ -46,7 +47,12 @@ impl App {
                 let detail = format!("the run `{name}` stands with another geometry or robot");
                 Err(AppError::Exists { detail })
             }
-            Err(AppError::NotFound { .. }) => self.create_run(site, name, new).await,
+            Err(AppError::NotFound { .. }) => {
+                // A laser that no translator takes is refused here, not at the first batch.
+                let text_config = site.state().text_config()?;
+                RunTranslator::new(&text_config.engine, &new.geometry, text_config.quantizer)?;
+                self.create_run(site, name, new).await
+            }
             Err(error) => Err(error),
         }
     }
@@ -56,7 +62,10 @@ impl App {
         let run = StoredRun { name: name.to_string(), robot: new.robot, geometry: new.geometry };
         let create = |record: &mut super::records::SiteRecord, batch: &mut crate::storage::Batch| {
             if record.num_runs >= num_runs_max {
-                return Err(AppError::invalid("run", format!("the site holds {num_runs_max} runs, its limit")));
+                return Err(AppError::invalid(
+                    "run",
+                    format!("the site holds {num_runs_max} runs, its limit"),
+                ));
             }
             let idx = record.num_runs;
             record.num_runs += 1;
@@ -106,7 +115,8 @@ impl Site {
     /// # Errors
     /// Those of the storage.
     pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<Vec<RunInfo>, AppError> {
-        let end = self.state().record.num_runs.min(from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX)));
+        let end =
+            self.state().record.num_runs.min(from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX)));
         let mut runs = Vec::new();
         for idx in from..end {
             runs.push(read_run(&**self.store(), self.generation(), idx).await?);
@@ -118,7 +128,11 @@ impl Site {
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub(super) async fn writer(&self, name: &Name, num_batches_max: usize) -> Result<Arc<RunWriter>, AppError> {
+    pub(super) async fn writer(
+        &self,
+        name: &Name,
+        num_batches_max: usize,
+    ) -> Result<Arc<RunWriter>, AppError> {
         if let Some(writer) = self.writers.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
             return Ok(Arc::clone(writer));
         }

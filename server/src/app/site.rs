@@ -5,12 +5,13 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use bytes::Bytes;
 use locution_engine::config::EngineConfig;
+use locution_engine::text::Quantizer;
 
 use super::records::{RunHead, SiteRecord, TextHead};
 use super::run_writer::RunWriter;
 use super::{App, AppError, Name};
 use crate::storage::keys::{Generation, Key};
-use crate::storage::{Batch, Precondition, Reader, SiteStore, StorageError, codec};
+use crate::storage::{Batch, Precondition, SiteStore, StorageError, codec};
 
 /// An open site.
 pub struct Site {
@@ -36,10 +37,34 @@ pub struct SiteState {
 impl SiteState {
     fn decode(bytes: Bytes) -> Result<Self, StorageError> {
         let record: SiteRecord = codec::decode(&bytes, "the record of the site")?;
-        let config = serde_json::from_str(&record.config_json)
-            .map_err(|error| StorageError::Corrupt { what: format!("the configuration of the site: {error}") })?;
+        let config = serde_json::from_str(&record.config_json).map_err(|error| StorageError::Corrupt {
+            what: format!("the configuration of the site: {error}"),
+        })?;
         Ok(Self { record, config: Arc::new(config), bytes })
     }
+
+    /// How the texts of the serving generation are written.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`].
+    pub fn text_config(&self) -> Result<TextConfig, StorageError> {
+        let parse = |json: &String| {
+            serde_json::from_str(json).map_err(|error| StorageError::Corrupt {
+                what: format!("the partition of densities: {error}"),
+            })
+        };
+        let quantizer = self.record.quantizer_json.as_ref().map(parse).transpose()?;
+        Ok(TextConfig { engine: Arc::clone(&self.config), quantizer })
+    }
+}
+
+/// All that decides what text a run becomes.
+#[derive(Clone, Debug)]
+pub struct TextConfig {
+    /// The site's configuration.
+    pub engine: Arc<EngineConfig>,
+    /// The partition of densities that the generation is written with, when it is not the configured one.
+    pub quantizer: Option<Quantizer>,
 }
 
 /// What a site is and holds.
@@ -156,7 +181,9 @@ impl App {
                 }
                 Ok((site, false))
             }
-            Err(AppError::NotFound { .. }) => Ok((self.create_site(name, config.unwrap_or_default()).await?, true)),
+            Err(AppError::NotFound { .. }) => {
+                Ok((self.create_site(name, config.unwrap_or_default()).await?, true))
+            }
             Err(error) => Err(error),
         }
     }
@@ -166,6 +193,7 @@ impl App {
             config_json: serde_json::to_string(&config).map_err(AppError::internal)?,
             num_runs: 0,
             generation: 0,
+            quantizer_json: None,
             map_version: 0,
             next_job: 1,
             next_decision: 1,

@@ -6,11 +6,11 @@
 
 use locution_engine::geometry::{Pose2, wrap_angle};
 
+use super::AppError;
 use super::reading::read_stored_keyframes;
 use super::runs::RunInfo;
 use super::scans::read_stamps;
 use super::site::Site;
-use super::AppError;
 
 /// In whose coordinates poses are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,17 +44,26 @@ pub struct Trajectory {
 }
 
 impl Site {
-    /// The trajectory of a run in its own frame or in that of its odometry.
+    /// The trajectory of a run; `version` counts in the map frame only.
     ///
     /// # Errors
-    /// Those of the storage.
-    pub async fn run_trajectory(&self, info: &RunInfo, is_raw: bool) -> Result<Trajectory, AppError> {
+    /// [`AppError::NotReady`] in the map frame before the first build; those of the storage.
+    pub async fn trajectory(
+        &self,
+        info: &RunInfo,
+        frame: Frame,
+        _version: Option<u64>,
+    ) -> Result<Trajectory, AppError> {
         let stamps = read_stamps(&**self.store(), info.idx, 0..info.head.next_sequence).await?;
-        let anchors = if is_raw {
-            Vec::new()
-        } else {
-            let keyframes = read_stored_keyframes(&**self.store(), self.generation(), info).await?;
-            keyframes.iter().map(|keyframe| (keyframe.scan_seq, keyframe.run_from_robot)).collect()
+        let anchors = match frame {
+            Frame::Odom => Vec::new(),
+            Frame::Run => {
+                let keyframes = read_stored_keyframes(&**self.store(), self.generation(), info).await?;
+                keyframes.iter().map(|keyframe| (keyframe.scan_seq, keyframe.run_from_robot)).collect()
+            }
+            Frame::Map => {
+                return Err(AppError::NotReady { detail: "no map has been built; POST …/builds".into() });
+            }
         };
         Ok(Trajectory { component: None, poses: spread(&stamps, &anchors) })
     }
