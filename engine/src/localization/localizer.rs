@@ -39,8 +39,10 @@ pub struct LocalizerConfig {
     pub history_m: f64,
     /// Points of a scan used as evidence, at most.
     pub max_points: usize,
-    /// Beams count up to this length, metres.
+    /// Beams are evidence up to this length, metres: only far walls say how far along a corridor the robot is.
     pub range_max_m: f64,
+    /// Surroundings up to this distance are searched for, metres.
+    pub search_range_m: f64,
     /// What a whole scan of agreement is worth, natural logarithm; scans overlap, so less than a beam's likelihood.
     pub evidence_per_scan: f64,
     /// Agreement that a place off the map would show by chance.
@@ -49,8 +51,10 @@ pub struct LocalizerConfig {
     pub agreement_sure: f64,
     /// Travel without which nobody can be sure, metres.
     pub min_travel_m: f64,
-    /// Probability from which on the robot is found.
+    /// Probability from which on the robot may be found …
     pub sure_probability: f64,
+    /// … once it has lasted for this much travel, metres: look-alikes lead for a moment, not for long.
+    pub sure_for_m: f64,
 }
 
 impl Default for LocalizerConfig {
@@ -62,13 +66,15 @@ impl Default for LocalizerConfig {
             max_search_points: 250,
             search_every_m: 1.5,
             history_m: 25.0,
-            max_points: 60,
-            range_max_m: 12.0,
-            evidence_per_scan: 4.0,
+            max_points: 80,
+            range_max_m: 30.0,
+            search_range_m: 12.0,
+            evidence_per_scan: 3.0,
             agreement_elsewhere: 0.6,
             agreement_sure: 0.75,
             min_travel_m: 3.0,
             sure_probability: 0.99,
+            sure_for_m: 2.0,
         }
     }
 }
@@ -84,7 +90,9 @@ impl LocalizerConfig {
             ("search_every_m", self.search_every_m),
             ("history_m", self.history_m),
             ("range_max_m", self.range_max_m),
+            ("search_range_m", self.search_range_m),
             ("evidence_per_scan", self.evidence_per_scan),
+            ("sure_for_m", self.sure_for_m),
         ];
         for (name, value) in lengths {
             if !(value > 0.0 && value.is_finite()) {
@@ -147,6 +155,8 @@ pub struct Localizer {
     run_from_robot: Pose2,
     travel_m: f64,
     searched_at_m: Option<f64>,
+    /// Travel since which one place has been probable enough.
+    sure_since_m: Option<f64>,
     state: LocalizationState,
 }
 
@@ -169,6 +179,7 @@ impl Localizer {
             run_from_robot: Pose2::identity(),
             travel_m: 0.0,
             searched_at_m: None,
+            sure_since_m: None,
             state: LocalizationState::Lost,
         }
     }
@@ -277,7 +288,7 @@ impl Localizer {
                 self.forget_oldest();
             }
             self.tracks.clear();
-            self.searched_at_m = None;
+            (self.searched_at_m, self.sure_since_m) = (None, None);
         }
     }
 
@@ -295,7 +306,7 @@ impl Localizer {
         let points = surroundings(
             &self.moments,
             self.config.surroundings_m,
-            self.config.range_max_m,
+            self.config.search_range_m,
             self.config.max_search_points,
         );
         for proposal in map.pyramid.search(&points, &self.config.search) {
@@ -336,17 +347,18 @@ impl Localizer {
         weights.iter().map(|weight| weight / total).collect()
     }
 
-    fn decide(&self) -> LocalizationState {
+    /// Says whether the robot is found, and notes since when one place has been probable enough.
+    fn decide(&mut self) -> LocalizationState {
         let probabilities = self.probabilities();
-        let (Some(best), Some(&probability)) = (self.tracks.first(), probabilities.first()) else {
-            return LocalizationState::Lost;
-        };
-        let overall = best.recent(usize::MAX);
-        let is_sure = self.travel_m >= self.config.min_travel_m
-            && probability >= self.config.sure_probability
-            && overall.share >= self.config.agreement_sure;
         let known: f64 = probabilities.iter().sum();
-        match (is_sure, known > 0.5) {
+        let is_sure = self.tracks.first().zip(probabilities.first()).is_some_and(|(best, &probability)| {
+            probability >= self.config.sure_probability
+                && best.recent(usize::MAX).share >= self.config.agreement_sure
+        });
+        self.sure_since_m = if is_sure { self.sure_since_m.or(Some(self.travel_m)) } else { None };
+        let has_lasted =
+            self.sure_since_m.is_some_and(|since_m| self.travel_m - since_m >= self.config.sure_for_m);
+        match (has_lasted && self.travel_m >= self.config.min_travel_m, known > 0.5) {
             (true, _) => LocalizationState::Converged,
             (false, true) => LocalizationState::Ambiguous,
             (false, false) => LocalizationState::Lost,
