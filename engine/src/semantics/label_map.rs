@@ -1,0 +1,172 @@
+//! The conductor: all driving in one map → the surroundings of its places → a label for every observation.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::block::{Block, BlockEvidence};
+use super::config::SemanticsConfig;
+use super::label::PlaceLabel;
+use super::rules::label_of;
+use super::signature::{PlaceSignature, SignatureReader};
+use crate::geometry::{Point2, Pose2};
+use crate::scan::ScanGeometry;
+
+/// One run, at its poses in the map.
+#[derive(Clone, Debug)]
+pub struct DrivenRun<'a> {
+    /// The laser.
+    pub geometry: &'a ScanGeometry,
+    /// Scans and where they were taken.
+    pub scans: Vec<(Pose2, &'a [f32])>,
+    /// Where the observations were made, in order of travel.
+    pub map_from_observations: Vec<Pose2>,
+}
+
+/// Labels of the observations of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelledRun {
+    /// A label for each observation.
+    pub labels: Vec<PlaceLabel>,
+    /// The share of what was seen nearby that agrees with the label, in [0, 1].
+    pub confidences: Vec<f32>,
+    /// The surroundings looked at, with the observation that they belong to.
+    pub signatures: Vec<(usize, PlaceSignature)>,
+}
+
+/// A position whose surroundings are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Sample {
+    run_idx: usize,
+    pub observation_idx: usize,
+    pub position: Point2,
+}
+
+/// Labels every observation of runs that share one map frame.
+///
+/// The label belongs to the place: it is decided by what all runs saw around it and by where any of them drove.
+pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<LabelledRun> {
+    let samples: Vec<Sample> =
+        runs.iter().enumerate().flat_map(|(run_idx, run)| samples_of(config, run_idx, run)).collect();
+    let mut blocks: BTreeMap<(i64, i64), Vec<Sample>> = BTreeMap::new();
+    for sample in samples {
+        let key = |metres: f64| (metres / config.block_m).floor() as i64;
+        blocks.entry((key(sample.position.x), key(sample.position.y))).or_default().push(sample);
+    }
+    let blocks: Vec<Vec<Sample>> = blocks.into_values().collect();
+    let read: Vec<Vec<PlaceSignature>> =
+        blocks.par_iter().map(|samples| read_block(config, runs, samples)).collect();
+    let mut signatures: Vec<Vec<(usize, PlaceSignature)>> = vec![Vec::new(); runs.len()];
+    for (sample, signature) in blocks.iter().flatten().zip(read.into_iter().flatten()) {
+        signatures[sample.run_idx].push((sample.observation_idx, signature));
+    }
+    runs.iter()
+        .zip(signatures)
+        .map(|(run, mut signatures)| {
+            signatures.sort_by_key(|(observation_idx, _)| *observation_idx);
+            label_run(config, run, signatures)
+        })
+        .collect()
+}
+
+/// Positions of a run a little travel apart; the first is always one of them.
+pub(super) fn samples_of(config: &SemanticsConfig, run_idx: usize, run: &DrivenRun<'_>) -> Vec<Sample> {
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut travel_m = f64::INFINITY;
+    let mut last: Option<&Pose2> = None;
+    for (observation_idx, pose) in run.map_from_observations.iter().enumerate() {
+        travel_m += last.map_or(0.0, |last| last.distance(pose));
+        last = Some(pose);
+        if travel_m >= config.spacing_m - 1e-9 {
+            travel_m = 0.0;
+            samples.push(Sample { run_idx, observation_idx, position: pose.position() });
+        }
+    }
+    samples
+}
+
+/// The surroundings of positions that lie in one block.
+fn read_block(
+    config: &SemanticsConfig,
+    runs: &[DrivenRun<'_>],
+    samples: &[Sample],
+) -> Vec<PlaceSignature> {
+    let block = build_block(config, runs, samples);
+    let mut reader = SignatureReader::new(config, &block);
+    samples
+        .iter()
+        .map(|sample| block.index(&sample.position).map_or_else(Default::default, |cell| reader.read(cell)))
+        .collect()
+}
+
+/// The map around positions, with the margin that their labels need.
+pub(super) fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Block {
+    let lowest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MAX, f64::min);
+    let highest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MIN, f64::max);
+    let (left, bottom) = (lowest(|p| p.x), lowest(|p| p.y));
+    let (right, top) = (highest(|p| p.x), highest(|p| p.y));
+    let margin_m = config.margin_m();
+    // Whole cells, so that the same place falls into the same cells whatever else is in its block.
+    let snap = |metres: f64| (metres / config.resolution_m).floor() * config.resolution_m;
+    let lower_left = Point2::new(snap(left - margin_m), snap(bottom - margin_m));
+    let edge_m = (right - left).max(top - bottom) + 2.0 * margin_m + config.resolution_m;
+    let mut evidence = BlockEvidence::new(config, lower_left, edge_m);
+    let is_near = |position: &Point2, reach_m: f64| {
+        position.x > lower_left.x - reach_m
+            && position.y > lower_left.y - reach_m
+            && position.x < lower_left.x + edge_m + reach_m
+            && position.y < lower_left.y + edge_m + reach_m
+    };
+    for run in runs {
+        for (map_from_robot, ranges_m) in &run.scans {
+            if is_near(&map_from_robot.position(), config.sight_m) {
+                evidence.add_scan(run.geometry, map_from_robot, ranges_m);
+            }
+        }
+        for pose in &run.map_from_observations {
+            if is_near(&pose.position(), config.driven_radius_m) {
+                evidence.add_driven(&pose.position());
+            }
+        }
+    }
+    evidence.finish()
+}
+
+/// Labels of all observations from those of the positions looked at.
+fn label_run(
+    config: &SemanticsConfig,
+    run: &DrivenRun<'_>,
+    signatures: Vec<(usize, PlaceSignature)>,
+) -> LabelledRun {
+    let raw: Vec<PlaceLabel> =
+        signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
+    let reach = (config.smoothing_m / config.spacing_m).round() as usize;
+    let smooth: Vec<(PlaceLabel, f32)> = (0..raw.len()).map(|at| majority(&raw, at, reach)).collect();
+    let num_observations = run.map_from_observations.len();
+    let mut labels = Vec::with_capacity(num_observations);
+    let mut confidences = Vec::with_capacity(num_observations);
+    let mut nearest = 0;
+    for observation_idx in 0..num_observations {
+        let distance = |position: usize| signatures[position].0.abs_diff(observation_idx);
+        while nearest + 1 < signatures.len() && distance(nearest + 1) <= distance(nearest) {
+            nearest += 1;
+        }
+        let (label, confidence) = smooth[nearest];
+        labels.push(label);
+        confidences.push(confidence);
+    }
+    LabelledRun { labels, confidences, signatures }
+}
+
+/// The most frequent label within `reach` positions and its share; of equals the one in the middle, else the first.
+fn majority(labels: &[PlaceLabel], at: usize, reach: usize) -> (PlaceLabel, f32) {
+    let window = &labels[at.saturating_sub(reach)..(at + reach + 1).min(labels.len())];
+    let count = |label: PlaceLabel| window.iter().filter(|other| **other == label).count();
+    let mut best = labels[at];
+    for label in PlaceLabel::ALL {
+        if count(label) > count(best) {
+            best = label;
+        }
+    }
+    (best, count(best) as f32 / window.len() as f32)
+}
