@@ -9,8 +9,6 @@ mod config;
 mod estimate;
 mod flood_fill;
 mod kernel;
-#[cfg(test)]
-mod reference;
 
 pub use config::{DensityConfig, KernelConfig, KernelProfile};
 pub use estimate::{DensityEstimator, FreeSpaceDensity};

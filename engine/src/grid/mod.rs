@@ -11,8 +11,6 @@ mod config;
 mod field_of_view;
 mod himm;
 mod local_map;
-#[cfg(test)]
-mod reference;
 
 pub use cell::Cell;
 pub use config::{LocalMapConfig, in_cells};

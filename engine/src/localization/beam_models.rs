@@ -68,7 +68,8 @@ impl<'a> BeamModel<'a> {
         comparison: BeamComparison,
         config: &'a BeamModelConfig,
     ) -> Self {
-        let spacing = (config.beam_spacing_rad / geometry.angle_increment_rad.abs()).round().max(1.0) as usize;
+        let spacing =
+            (config.beam_spacing_rad / geometry.angle_increment_rad.abs()).round().max(1.0) as usize;
         let sample = |(beam_idx, &range_m): (usize, &f32)| {
             let range_m = if geometry.is_return(range_m) { f64::from(range_m) } else { config.range_max_m };
             (geometry.beam_angle_rad(beam_idx), range_m.min(config.range_max_m))
@@ -85,10 +86,17 @@ impl<'a> BeamModel<'a> {
         }
         let map_from_laser = map_from_robot.compose(&self.robot_from_laser);
         let expected = self.beams.iter().map(|&(angle, _)| {
-            cast_ray(self.map, &map_from_laser.position(), map_from_laser.theta + angle, self.config.range_max_m)
+            cast_ray(
+                self.map,
+                &map_from_laser.position(),
+                map_from_laser.theta + angle,
+                self.config.range_max_m,
+            )
         });
         match self.comparison {
-            BeamComparison::Beams => expected.zip(&self.beams).map(|(cast, &(_, sensed))| self.beam(cast, sensed)).product(),
+            BeamComparison::Beams => {
+                expected.zip(&self.beams).map(|(cast, &(_, sensed))| self.beam(cast, sensed)).product()
+            }
             BeamComparison::Cosine => self.cosine(expected),
         }
     }

@@ -5,7 +5,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::density_field::{DensityField, FULL, KernelReading, MAX_KERNELS, NOT_FREE, STABLE, UNDEFINED, direction_code};
+use super::density_field::{
+    DensityField, FULL, KernelReading, MAX_KERNELS, NOT_FREE, STABLE, UNDEFINED, direction_code,
+};
 use super::particle_filter::SensorModel;
 use super::particles::Particles;
 use crate::config::ConfigError;
@@ -41,7 +43,10 @@ impl DensityModelConfig {
             }
         }
         if !(self.direction_tolerance_rad > 0.0 && self.direction_tolerance_rad <= std::f64::consts::PI) {
-            return Err(ConfigError::new(format!("{path}.direction_tolerance_rad"), "must lie in 0..=π and not be 0"));
+            return Err(ConfigError::new(
+                format!("{path}.direction_tolerance_rad"),
+                "must lie in 0..=π and not be 0",
+            ));
         }
         Ok(())
     }

@@ -91,7 +91,11 @@ pub(super) fn cluster(particles: &Particles, origin: &Point2, config: &ClusterCo
 fn bin_of(particles: &Particles, index: usize, config: &ClusterConfig) -> Bin {
     let cell = |metres: f32| (f64::from(metres) / config.bin_m).floor() as i32;
     let heading = (f64::from(particles.heading_turns[index]) * config.num_heading_bins as f64).floor() as i32;
-    (cell(particles.x_m[index]), cell(particles.y_m[index]), heading.rem_euclid(config.num_heading_bins as i32))
+    (
+        cell(particles.x_m[index]),
+        cell(particles.y_m[index]),
+        heading.rem_euclid(config.num_heading_bins as i32),
+    )
 }
 
 fn neighbours((x, y, heading): Bin, num_headings: i32) -> impl Iterator<Item = Bin> {
@@ -107,7 +111,12 @@ fn summarise(particles: &Particles, members: &[u32], origin: &Point2, total: f64
     let coordinates = |member: u32| {
         let index = member as usize;
         let heading = f64::from(particles.heading_turns[index]) * TAU;
-        (f64::from(particles.weight[index]), f64::from(particles.x_m[index]), f64::from(particles.y_m[index]), heading)
+        (
+            f64::from(particles.weight[index]),
+            f64::from(particles.x_m[index]),
+            f64::from(particles.y_m[index]),
+            heading,
+        )
     };
     for (weight, px, py, heading) in members.iter().map(|&member| coordinates(member)) {
         mass += weight;

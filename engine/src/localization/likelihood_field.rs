@@ -129,7 +129,8 @@ impl LikelihoodField {
 
     /// Mean code of beam ends in the robot's frame, seen from a pose; 0 for none.
     pub fn mean_code(&self, points: &[Point2], map_from_robot: &Pose2) -> f64 {
-        let sum: u32 = points.iter().map(|point| u32::from(self.code_at(&map_from_robot.transform_point(point)))).sum();
+        let sum: u32 =
+            points.iter().map(|point| u32::from(self.code_at(&map_from_robot.transform_point(point)))).sum();
         if points.is_empty() { 0.0 } else { f64::from(sum) / points.len() as f64 }
     }
 }
@@ -260,7 +261,11 @@ mod tests {
     fn scattered(rng: &mut ChaCha8Rng, width: usize, height: usize) -> GridMap {
         let mut map = GridMap::unknown(width, height, 0.1, Point2::new(-3.0, 2.0));
         for _ in 0..width * height / 15 {
-            map.set(rng.random_range(0..width as i64), rng.random_range(0..height as i64), CellState::Occupied);
+            map.set(
+                rng.random_range(0..width as i64),
+                rng.random_range(0..height as i64),
+                CellState::Occupied,
+            );
         }
         map
     }
@@ -292,7 +297,11 @@ mod tests {
             (0..19).map(|_| Point2::new(rng.random_range(-4.0..4.0), rng.random_range(-4.0..4.0))).collect();
         let mut particles = Particles::default();
         for _ in 0..300 {
-            let pose = Pose2::new(rng.random_range(-4.0..7.0), rng.random_range(1.0..10.0), rng.random_range(-3.0..3.0));
+            let pose = Pose2::new(
+                rng.random_range(-4.0..7.0),
+                rng.random_range(1.0..10.0),
+                rng.random_range(-3.0..3.0),
+            );
             particles.push(&pose, &map.origin());
         }
         let model = LikelihoodFieldModel::new(&field, &points);

@@ -9,6 +9,7 @@
 //! likelihood field ([`LikelihoodFieldModel`], for tracking) or the thesis' two rivals ([`BeamModel`]). Every random
 //! number comes from the filter's seed.
 
+mod arc_planes;
 mod beam_models;
 mod bit_window;
 mod connected_disc;

@@ -48,7 +48,12 @@ impl OdometryMotionModel {
     /// # Errors
     /// The first field that is negative or not finite.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        let fields = [("alpha1", self.alpha1), ("alpha2", self.alpha2), ("alpha3", self.alpha3), ("alpha4", self.alpha4)];
+        let fields = [
+            ("alpha1", self.alpha1),
+            ("alpha2", self.alpha2),
+            ("alpha3", self.alpha3),
+            ("alpha4", self.alpha4),
+        ];
         for (name, value) in fields {
             if !(value >= 0.0 && value.is_finite()) {
                 return Err(ConfigError::new(format!("{path}.{name}"), "must be finite and not negative"));
@@ -58,7 +63,12 @@ impl OdometryMotionModel {
     }
 
     /// Moves every particle by the odometry step `previous_from_robot`, with noise of its own.
-    pub(super) fn predict(&self, particles: &mut Particles, previous_from_robot: &Pose2, noise: &mut NoiseLanes) {
+    pub(super) fn predict(
+        &self,
+        particles: &mut Particles,
+        previous_from_robot: &Pose2,
+        noise: &mut NoiseLanes,
+    ) {
         let step = self.step(previous_from_robot);
         let Particles { x_m, y_m, heading_turns, .. } = particles;
         let (x_blocks, x_rest) = x_m.as_chunks_mut::<LANES>();
@@ -154,6 +164,10 @@ mod tests {
         let poses = moved(&model, &Pose2::identity(), &Pose2::new(1.0, 0.0, 0.0), 4001);
         let mean = poses.iter().map(|pose| pose.x).sum::<f64>() / poses.len() as f64;
         let variance = poses.iter().map(|pose| (pose.x - mean).powi(2)).sum::<f64>() / poses.len() as f64;
-        assert!((mean - 1.0).abs() < 0.02 && (variance.sqrt() - 0.2).abs() < 0.02, "{mean} ± {}", variance.sqrt());
+        assert!(
+            (mean - 1.0).abs() < 0.02 && (variance.sqrt() - 0.2).abs() < 0.02,
+            "{mean} ± {}",
+            variance.sqrt()
+        );
     }
 }

@@ -13,7 +13,11 @@ pub(super) fn cast_ray(map: &GridMap, from: &Point2, angle_rad: f64, range_max_m
     let axis = |position: f64, cell: i64, slope: f64| {
         let step = if slope > 0.0 { 1 } else { -1 };
         let edge = (cell + i64::from(step == 1)) as f64 * resolution;
-        if slope == 0.0 { (0, f64::INFINITY, f64::INFINITY) } else { (step, (edge - position) / slope, resolution / slope.abs()) }
+        if slope == 0.0 {
+            (0, f64::INFINITY, f64::INFINITY)
+        } else {
+            (step, (edge - position) / slope, resolution / slope.abs())
+        }
     };
     let (step_x, mut next_x, pace_x) = axis(from.x - origin.x, column, cos);
     let (step_y, mut next_y, pace_y) = axis(from.y - origin.y, row, sin);

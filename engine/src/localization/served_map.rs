@@ -43,7 +43,9 @@ fn free_cells_by_neighbourhood(grid: &GridMap) -> Vec<u32> {
     const SIDE: usize = 8;
     let (width, height) = (grid.width(), grid.height());
     let mut cells = Vec::with_capacity(grid.num_free());
-    for (bottom, left) in (0..height).step_by(SIDE).flat_map(|y| (0..width).step_by(SIDE).map(move |x| (y, x))) {
+    for (bottom, left) in
+        (0..height).step_by(SIDE).flat_map(|y| (0..width).step_by(SIDE).map(move |x| (y, x)))
+    {
         for row in bottom..(bottom + SIDE).min(height) {
             for column in left..(left + SIDE).min(width) {
                 let cell = row * width + column;

@@ -28,7 +28,12 @@ fn served() -> ServedMap {
 }
 
 /// Eqs 3.3–3.6 as they are printed.
-fn weight_as_printed(map: &ServedMap, pose: &Pose2, seen: &[KernelReading], config: &DensityModelConfig) -> f64 {
+fn weight_as_printed(
+    map: &ServedMap,
+    pose: &Pose2,
+    seen: &[KernelReading],
+    config: &DensityModelConfig,
+) -> f64 {
     let (column, row) = map.grid.cell_at(&pose.position());
     if map.grid.state(column, row) != CellState::Free {
         return 0.0;
@@ -37,7 +42,11 @@ fn weight_as_printed(map: &ServedMap, pose: &Pose2, seen: &[KernelReading], conf
     for (kernel, robot) in seen.iter().enumerate() {
         let cell = map.density.reading(column, row, kernel).expect("the cell is free");
         if let (Some(robot), Some(cell)) = (robot.density, cell.density) {
-            weight *= if f64::from((robot - cell).abs()) <= config.density_tolerance { 1.0 } else { config.penalty };
+            weight *= if f64::from((robot - cell).abs()) <= config.density_tolerance {
+                1.0
+            } else {
+                config.penalty
+            };
         }
         if let (Some(robot), Some(cell)) = (robot.descent_rad, cell.descent_rad) {
             let difference = angle_between(-f64::from(robot), pose.theta - f64::from(cell));
@@ -58,7 +67,11 @@ fn byte_tests_weigh_as_the_equations_are_printed() {
         let seen = observe(&map.grid, &robot, &fields);
         let mut particles = Particles::default();
         for _ in 0..2000 {
-            let pose = Pose2::new(rng.random_range(-4.5..8.5), rng.random_range(6.5..16.5), rng.random_range(-3.1..3.1));
+            let pose = Pose2::new(
+                rng.random_range(-4.5..8.5),
+                rng.random_range(6.5..16.5),
+                rng.random_range(-3.1..3.1),
+            );
             particles.push(&pose, &map.grid.origin());
         }
         DensityModel::new(&map.density, &seen, &config).weigh(&mut particles);
@@ -81,11 +94,15 @@ fn the_robot_sees_what_the_map_holds() {
     let (column, row) = map.grid.cell_at(&pose.position());
     for (kernel, seen) in observe(&map.grid, &pose, &config).iter().enumerate() {
         let held = map.density.reading(column, row, kernel).expect("the cell is free");
-        let (seen_density, held_density) = (seen.density.expect("all is known"), held.density.expect("all is known"));
+        let (seen_density, held_density) =
+            (seen.density.expect("all is known"), held.density.expect("all is known"));
         assert!((seen_density - held_density).abs() < 0.003, "kernel {kernel}");
         match (seen.descent_rad, held.descent_rad) {
             (Some(seen), Some(held)) => {
-                assert!(angle_between(f64::from(seen) + pose.theta, f64::from(held)) < 0.03, "kernel {kernel}");
+                assert!(
+                    angle_between(f64::from(seen) + pose.theta, f64::from(held)) < 0.03,
+                    "kernel {kernel}"
+                );
             }
             (seen, held) => assert_eq!(seen, held, "kernel {kernel}"),
         }
@@ -105,7 +122,8 @@ fn drive() -> Vec<Pose2> {
     let mut poses = Vec::new();
     for pair in corners.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
-        let (heading, length): (f64, f64) = ((y1 - y0 as f64).atan2(x1 - x0 as f64), (x1 - x0 as f64).hypot(y1 - y0));
+        let (heading, length): (f64, f64) =
+            ((y1 - y0 as f64).atan2(x1 - x0 as f64), (x1 - x0 as f64).hypot(y1 - y0));
         let num_steps = (length / 0.1) as usize;
         poses.extend((0..num_steps).map(|step| {
             let share = step as f64 / num_steps as f64;
@@ -133,7 +151,11 @@ fn densities_alone_find_the_robot_and_the_seed_repeats_it() {
     let found = localise(4, &map);
     let truth = drive()[drive().len() - 1];
     assert!(found[0].map_from_robot.distance(&truth) < 0.5, "{:?} is not {truth:?}", found[0]);
-    assert!(angle_between(found[0].map_from_robot.theta, truth.theta) < 0.3, "{:?} is not {truth:?}", found[0]);
+    assert!(
+        angle_between(found[0].map_from_robot.theta, truth.theta) < 0.3,
+        "{:?} is not {truth:?}",
+        found[0]
+    );
     assert_eq!(localise(4, &map), found);
 }
 
@@ -142,6 +164,10 @@ fn a_map_without_free_space_is_survived() {
     let grid = GridMap::unknown(20, 20, 0.1, Point2::default());
     let map = ServedMap::build(grid, &DensityFieldConfig::default(), &LikelihoodFieldConfig::default());
     let mut filter = ParticleFilter::global(&map, ParticleFilterConfig::default(), 1);
-    filter.update(&map, &Pose2::new(0.1, 0.0, 0.0), &LikelihoodFieldModel::new(&map.likelihood, &[Point2::default()]));
+    filter.update(
+        &map,
+        &Pose2::new(0.1, 0.0, 0.0),
+        &LikelihoodFieldModel::new(&map.likelihood, &[Point2::default()]),
+    );
     assert!(filter.hypotheses(&map).is_empty());
 }

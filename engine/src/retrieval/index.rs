@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::RetrievalConfig;
 use super::profile::RunProfile;
-use super::search::{best_places, max_difference, window_costs};
+use super::search::{best_places, window_costs};
 use crate::text::{Direction, Interval};
 
 /// A stretch of driving whose density profile resembles a query window.
@@ -19,12 +19,13 @@ pub struct ProfileCandidate {
     pub later: Interval,
     /// Which way the earlier stretch was driven.
     pub direction: Direction,
-    /// Root mean square difference of the densities over window and kernels, in [0, 1]; large ones are cut off.
-    pub rms_difference: f64,
-    /// Resemblance, higher is better; comparable between windows of one site.
+    /// 1 when all densities are equal, 0 when all differ by the largest difference or more.
+    pub resemblance: f64,
+    /// How far the window's difference from this stretch lies below its mean difference from all stretches of the site
+    /// in this direction, in standard deviations: higher is better, whatever the length of the window.
     pub score: f64,
-    /// Evidence of the best candidate at a different stretch, in either direction, relative to this one's; 1 is fully
-    /// ambiguous. The same place driven twice before counts as two stretches.
+    /// Score of the best candidate at a different stretch, in either direction, relative to this one's, in [0, 1]; 1
+    /// is fully ambiguous. The same place driven twice before counts as two stretches.
     pub ambiguity: f64,
 }
 
@@ -39,9 +40,24 @@ pub struct ProfileIndex {
 #[derive(Clone, Copy, Debug)]
 struct Place {
     run_idx: usize,
-    sample: usize,
+    /// First sample of the earlier stretch and of the query window, and their length.
+    earlier_start: usize,
+    later_start: usize,
+    length: usize,
     direction: Direction,
-    cost: u32,
+    cost: u16,
+    score: f64,
+}
+
+impl Place {
+    /// Same for all windows that pair the same observations: the shift between the stretches, doubled where they are
+    /// read in opposite directions and only their centres count.
+    fn diagonal(&self) -> i64 {
+        match self.direction {
+            Direction::Same => 2 * (self.earlier_start as i64 - self.later_start as i64),
+            Direction::Opposite => 2 * (self.earlier_start + self.later_start + self.length) as i64,
+        }
+    }
 }
 
 impl ProfileIndex {
@@ -56,89 +72,157 @@ impl ProfileIndex {
     }
 
     /// Candidates of every query window of a run among earlier runs and the earlier part of the run itself, in order
-    /// of travel, each window's best first.
+    /// of travel, the best of each centre first.
     pub fn all_candidates(&self, later_run: usize) -> Vec<ProfileCandidate> {
         let Some(profile) = self.runs.get(later_run) else { return Vec::new() };
-        let length = self.config.num_samples(self.config.window_m);
-        let starts: Vec<usize> = (0..(profile.len() + 1).saturating_sub(length))
-            .step_by(self.config.num_samples(self.config.query_step_m))
-            .collect();
-        let by_window: Vec<Vec<ProfileCandidate>> =
-            starts.par_iter().map(|&start| self.candidates(later_run, start)).collect();
-        by_window.into_iter().flatten().collect()
+        let step = self.config.num_samples(self.config.query_step_m);
+        let centers: Vec<usize> = (0..profile.len()).step_by(step).collect();
+        let by_center: Vec<Vec<ProfileCandidate>> =
+            centers.par_iter().map(|&center| self.candidates(later_run, center)).collect();
+        by_center.into_iter().flatten().collect()
     }
 
-    /// Candidates of the window of a run that starts at a sample, best first.
-    pub fn candidates(&self, later_run: usize, first_sample: usize) -> Vec<ProfileCandidate> {
+    /// Candidates of the windows of a run around a sample, best first.
+    pub fn candidates(&self, later_run: usize, center_sample: usize) -> Vec<ProfileCandidate> {
         let Some(profile) = self.runs.get(later_run) else { return Vec::new() };
-        let length = self.config.num_samples(self.config.window_m);
-        self.search(profile, later_run, first_sample..first_sample + length)
+        self.search(profile, later_run, center_sample)
     }
 
-    /// Candidates among all runs of a window of a profile that is not part of the site, best first; their later
-    /// interval names the run after the last.
-    pub fn candidates_of(&self, profile: &RunProfile, window: Range<usize>) -> Vec<ProfileCandidate> {
-        self.search(profile, self.runs.len(), window)
+    /// Candidates among all runs of the windows around a sample of a profile that is not part of the site, best
+    /// first; their later interval names the run after the last.
+    pub fn candidates_of(&self, profile: &RunProfile, center_sample: usize) -> Vec<ProfileCandidate> {
+        self.search(profile, self.runs.len(), center_sample)
     }
 
-    fn search(&self, profile: &RunProfile, later_run: usize, window: Range<usize>) -> Vec<ProfileCandidate> {
-        if window.is_empty() || window.end > profile.len() {
-            return Vec::new();
-        }
-        let suppression = self.config.num_samples(self.config.suppression_m);
-        let limit = max_difference(profile.channels.len());
+    fn search(&self, profile: &RunProfile, later_run: usize, center: usize) -> Vec<ProfileCandidate> {
+        let suppression = 2 * self.config.num_samples(self.config.suppression_m) as u64;
+        let mut lengths: Vec<usize> =
+            self.config.windows_m.iter().map(|&window_m| self.config.num_samples(window_m)).collect();
+        lengths.sort_unstable_by(|a, b| b.cmp(a));
         let mut places: Vec<Place> = Vec::new();
-        for direction in [Direction::Same, Direction::Opposite] {
-            let mut found: Vec<Place> = Vec::new();
-            for (run_idx, earlier) in self.runs.iter().enumerate().take(later_run + 1) {
-                let mut costs = window_costs(profile, window.clone(), earlier, direction, limit);
-                if run_idx == later_run {
-                    let gap = (self.config.min_gap_m / self.config.sample_spacing_m).ceil() as usize;
-                    costs.truncate((window.start + 1).saturating_sub(window.len() + gap));
-                }
-                let best = best_places(&costs, self.config.candidates_per_direction, suppression);
-                found.extend(best.into_iter().map(|(sample, cost)| Place {
+        for length in lengths {
+            let Some(start) = center.checked_sub(length / 2) else { continue };
+            if start + length > profile.len() {
+                continue;
+            }
+            for direction in [Direction::Same, Direction::Opposite] {
+                let found = self.best_of_window(profile, later_run, start..start + length, direction);
+                // A longer window that pairs the same observations says more.
+                let is_new = |place: &Place| {
+                    places.iter().all(|known| {
+                        known.direction != place.direction
+                            || known.run_idx != place.run_idx
+                            || known.diagonal().abs_diff(place.diagonal()) >= suppression
+                    })
+                };
+                let found: Vec<Place> = found.into_iter().filter(is_new).collect();
+                places.extend(found);
+            }
+        }
+        places.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.key().cmp(&b.key())));
+        (0..places.len())
+            .filter_map(|idx| self.candidate(&places, idx, (profile, later_run), suppression))
+            .collect()
+    }
+
+    fn best_of_window(
+        &self,
+        profile: &RunProfile,
+        later_run: usize,
+        window: Range<usize>,
+        direction: Direction,
+    ) -> Vec<Place> {
+        let suppression = self.config.num_samples(self.config.suppression_m);
+        let gap = (self.config.min_gap_m / self.config.sample_spacing_m).ceil() as usize;
+        let mut places = Vec::new();
+        let mut moments = Moments::default();
+        for (run_idx, earlier) in self.runs.iter().enumerate().take(later_run + 1) {
+            let mut costs =
+                window_costs(profile, window.clone(), earlier, direction, self.config.largest_step());
+            if run_idx == later_run {
+                costs.truncate((window.start + 1).saturating_sub(window.len() + gap));
+            }
+            moments.add(&costs);
+            for (earlier_start, cost) in best_places(&costs, self.config.candidates_per_window, suppression) {
+                let (later_start, length) = (window.start, window.len());
+                places.push(Place {
                     run_idx,
-                    sample,
+                    earlier_start,
+                    later_start,
+                    length,
                     direction,
                     cost,
-                }));
+                    score: 0.0,
+                });
             }
-            found.sort_by_key(|place| (place.cost, place.run_idx, place.sample));
-            found.truncate(self.config.candidates_per_direction);
-            places.extend(found);
         }
-        places.sort_by_key(|place| (place.cost, place.run_idx, place.sample));
-        let later = (profile, later_run, window);
-        (0..places.len()).filter_map(|idx| self.candidate(&places, idx, &later)).collect()
+        places.sort_by_key(|place| (place.cost, place.run_idx, place.earlier_start));
+        places.truncate(self.config.candidates_per_window);
+        for place in &mut places {
+            place.score = moments.deviations_below(place.cost);
+        }
+        places
     }
 
     fn candidate(
         &self,
         places: &[Place],
         idx: usize,
-        (profile, later_run, window): &(&RunProfile, usize, Range<usize>),
+        (profile, later_run): (&RunProfile, usize),
+        suppression: u64,
     ) -> Option<ProfileCandidate> {
         let place = places[idx];
         let interval = |profile: &RunProfile, run_idx: usize, first: usize| {
-            let last = profile.observation(first + window.len() - 1)?;
+            let last = profile.observation(first + place.length - 1)?;
             Some(Interval { run_idx: run_idx as u32, first: profile.observation(first)?, last })
         };
-        let suppression = self.config.num_samples(self.config.suppression_m);
+        let center = |place: &Place| 2 * place.earlier_start + place.length;
         let is_elsewhere = |other: &&Place| {
-            other.run_idx != place.run_idx || other.sample.abs_diff(place.sample) >= suppression
+            other.run_idx != place.run_idx || center(other).abs_diff(center(&place)) as u64 >= suppression
         };
-        let rival = places.iter().find(is_elsewhere).map_or(f64::INFINITY, |rival| f64::from(rival.cost));
-        let num_values = (window.len() * profile.channels.len().max(1)) as f64;
-        let rms_difference = (f64::from(place.cost) / num_values).sqrt() / 255.0;
+        let rival = places.iter().find(is_elsewhere).map_or(0.0, |rival| rival.score);
+        let worst = place.length * profile.channels.len() * usize::from(self.config.largest_step());
         Some(ProfileCandidate {
-            earlier: interval(&self.runs[place.run_idx], place.run_idx, place.sample)?,
-            later: interval(profile, *later_run, window.start)?,
+            earlier: interval(self.runs.get(place.run_idx)?, place.run_idx, place.earlier_start)?,
+            later: interval(profile, later_run, place.later_start)?,
             direction: place.direction,
-            rms_difference,
-            score: 1.0 - rms_difference,
-            ambiguity: ((f64::from(place.cost) + 1.0) / (rival + 1.0)).min(1.0),
+            resemblance: 1.0 - f64::from(place.cost) / worst.max(1) as f64,
+            score: place.score,
+            ambiguity: if place.score > 0.0 { (rival / place.score).clamp(0.0, 1.0) } else { 1.0 },
         })
+    }
+}
+
+impl Place {
+    /// Decides between equal scores.
+    fn key(&self) -> (usize, usize, usize, Direction) {
+        (self.run_idx, self.earlier_start, self.length, self.direction)
+    }
+}
+
+/// Mean and spread of a window's costs over all places, by exact integer sums.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moments {
+    count: u64,
+    sum: u64,
+    sum_of_squares: u64,
+}
+
+impl Moments {
+    fn add(&mut self, costs: &[u16]) {
+        self.count += costs.len() as u64;
+        for &cost in costs {
+            self.sum += u64::from(cost);
+            self.sum_of_squares += u64::from(cost) * u64::from(cost);
+        }
+    }
+
+    fn deviations_below(&self, cost: u16) -> f64 {
+        let count = self.count.max(1) as f64;
+        let mean = self.sum as f64 / count;
+        let variance = self.sum_of_squares as f64 / count - mean * mean;
+        // Sites with a place or two have no spread to speak of.
+        (mean - f64::from(cost)) / variance.max(1.0).sqrt()
     }
 }
 
@@ -164,15 +248,16 @@ mod tests {
         let there = profile((0..600).map(|idx| f64::from(idx) * 0.1));
         let back = profile((0..600).map(|idx| 60.0 - f64::from(idx) * 0.1));
         let index = ProfileIndex::build(vec![there.clone(), back], RetrievalConfig::default());
-        let best = &index.candidates(1, 80)[0];
+        let best = &index.candidates(1, 96)[0];
         assert_eq!(best.direction, Direction::Opposite);
-        assert!(best.earlier.first.abs_diff(400 - 80) < 4 && best.later.first.abs_diff(200) < 2, "{best:?}");
-        assert!(best.rms_difference < 0.01 && best.ambiguity < 0.5);
+        let centers = (best.earlier.first + best.earlier.last, best.later.first + best.later.last);
+        assert!(centers.0.abs_diff(2 * (600 - 240)) < 8 && centers.1.abs_diff(2 * 240) < 8, "{best:?}");
+        assert!(best.resemblance > 0.8 && best.ambiguity < 0.9, "{best:?}");
 
         let again = profile((0..200).map(|idx| 20.0 + f64::from(idx) * 0.1));
-        let best = &index.candidates_of(&again, 10..42)[0];
+        let best = &index.candidates_of(&again, 40)[0];
         assert_eq!((best.direction, best.later.run_idx, best.earlier.run_idx), (Direction::Same, 2, 0));
-        assert!(best.earlier.first.abs_diff(225) < 4, "{best:?}");
+        assert!(best.earlier.first.abs_diff(200 + best.later.first) < 4, "{best:?}");
     }
 
     #[test]
@@ -188,7 +273,7 @@ mod tests {
     fn windows_that_do_not_fit_have_no_candidates() {
         let run = profile((0..30).map(|idx| f64::from(idx) * 0.1));
         let index = ProfileIndex::build(vec![run, RunProfile::default()], RetrievalConfig::default());
-        assert!(index.candidates(0, 0).is_empty() && index.candidates(1, 0).is_empty());
+        assert!(index.candidates(0, 0).is_empty() && index.candidates(1, 4).is_empty());
         assert!(index.candidates(7, 0).is_empty() && index.all_candidates(1).is_empty());
     }
 }

@@ -7,7 +7,7 @@ use crate::config::ConfigError;
 
 /// How densities become classes (thesis 4.2.1, SPEC 3.5).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum QuantizerConfig {
     /// Classes of one width.
     Uniform {

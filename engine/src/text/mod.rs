@@ -4,6 +4,8 @@ mod builder;
 mod config;
 mod observation;
 mod quantizer;
+#[cfg(test)]
+mod reference;
 mod stretch;
 mod word;
 

@@ -1,0 +1,30 @@
+//! For those who run the server: health, readiness, metrics.
+
+use axum::extract::State;
+use axum::response::Response;
+
+use super::text;
+use crate::error::{ApiError, Problem};
+use crate::state::AppState;
+
+/// The process is alive.
+#[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operations",
+    responses((status = 200, body = String, content_type = "text/plain")))]
+pub async fn healthz() -> Response {
+    text("ok\n".into())
+}
+
+/// The storage answers, so requests will be served.
+#[utoipa::path(get, path = "/readyz", operation_id = "get_readiness", tag = "operations",
+    responses((status = 200, body = String, content_type = "text/plain"), (status = 503, body = Problem)))]
+pub async fn readyz(State(state): State<AppState>) -> Result<Response, ApiError> {
+    state.app.check_ready().await?;
+    Ok(text("ready\n".into()))
+}
+
+/// Counters and histograms in Prometheus' text format.
+#[utoipa::path(get, path = "/metrics", operation_id = "get_metrics", tag = "operations",
+    responses((status = 200, body = String, content_type = "text/plain")))]
+pub async fn metrics(State(state): State<AppState>) -> Response {
+    text(state.metrics.render())
+}
