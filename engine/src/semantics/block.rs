@@ -80,7 +80,8 @@ impl<'a> BlockEvidence<'a> {
                 }
             }
             if range < reach_m
-                && let Some(index) = self.index(map_from_laser.x + cos * range, map_from_laser.y + sin * range)
+                && let Some(index) =
+                    self.index(map_from_laser.x + cos * range, map_from_laser.y + sin * range)
             {
                 self.hits[index] = self.hits[index].saturating_add(1);
             }

@@ -1,10 +1,15 @@
 //! What labelling can be told.
 
+use std::f64::consts::PI;
+
 use serde::{Deserialize, Serialize};
 
 use crate::config::ConfigError;
 
-/// How places are labelled.
+/// How places are labelled from the map.
+///
+/// The lengths of forks and bends and the two angles of corners were chosen on `aces`, `intel` and `mit-killian`; what
+/// they are worth on a building that had no say in them is told in `docs/labels.md`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SemanticsConfig {
@@ -40,8 +45,14 @@ pub struct SemanticsConfig {
     pub bend_near_m: f64,
     /// and on for this long, metres.
     pub bend_length_m: f64,
-    /// A straighter passage is no corner.
+    /// A straighter passage is no corner (see [`super::PlaceSignature::straightness`]).
     pub corner_straightness: f64,
+    /// The way driven through a corner turns by at least this, radians,
+    pub corner_turn_rad: f64,
+    /// from so much travel before to so much travel after, metres.
+    pub turn_reach_m: f64,
+    /// A place with a straighter passage is no dead end.
+    pub dead_end_straightness: f64,
     /// Driven ways are counted from this distance, metres,
     pub driven_near_m: f64,
     /// and must go on for this long, metres.
@@ -69,11 +80,14 @@ impl Default for SemanticsConfig {
             fork_near_m: 1.5,
             fork_near_per_half_width: 2.0,
             fork_near_max_m: 5.5,
-            fork_length_m: 3.5,
+            fork_length_m: 4.5,
             bend_half_width_m: 0.7,
-            bend_near_m: 3.0,
+            bend_near_m: 4.0,
             bend_length_m: 1.5,
-            corner_straightness: 0.82,
+            corner_straightness: 0.84,
+            corner_turn_rad: 25.0 / 180.0 * PI,
+            turn_reach_m: 2.0,
+            dead_end_straightness: 0.8,
             driven_near_m: 1.5,
             driven_length_m: 5.0,
             hall_radius_m: 3.0,
@@ -115,6 +129,9 @@ impl SemanticsConfig {
             ("bend_near_m", self.bend_near_m, 0.1, 20.0),
             ("bend_length_m", self.bend_length_m, 0.1, 20.0),
             ("corner_straightness", self.corner_straightness, 0.0, 1.0),
+            ("corner_turn_rad", self.corner_turn_rad, 0.0, PI),
+            ("turn_reach_m", self.turn_reach_m, 0.1, 20.0),
+            ("dead_end_straightness", self.dead_end_straightness, 0.0, 1.0),
             ("driven_near_m", self.driven_near_m, 0.1, 20.0),
             ("driven_length_m", self.driven_length_m, 0.1, 20.0),
             ("hall_radius_m", self.hall_radius_m, 0.5, 10.0),

@@ -145,10 +145,7 @@ impl Flood {
         }
         let length_cells = f64::from(far - near) / f64::from(EDGE_STEP);
         (num_far > 0.0).then(|| Passage {
-            far_end: Point2::new(
-                sum_x / num_far * block.resolution_m,
-                sum_y / num_far * block.resolution_m,
-            ),
+            far_end: Point2::new(sum_x / num_far * block.resolution_m, sum_y / num_far * block.resolution_m),
             mean_width_m: group.len() as f64 / length_cells.max(1.0) * block.resolution_m,
             is_driven,
         })

@@ -9,7 +9,7 @@ use super::config::SemanticsConfig;
 use super::label::PlaceLabel;
 use super::rules::label_of;
 use super::signature::{PlaceSignature, SignatureReader};
-use crate::geometry::{Point2, Pose2};
+use crate::geometry::{Point2, Pose2, angle_between};
 use crate::scan::ScanGeometry;
 
 /// One run, at its poses in the map.
@@ -36,10 +36,11 @@ pub struct LabelledRun {
 
 /// A position whose surroundings are looked at.
 #[derive(Clone, Copy)]
-pub(super) struct Sample {
+struct Sample {
     run_idx: usize,
-    pub observation_idx: usize,
-    pub position: Point2,
+    observation_idx: usize,
+    position: Point2,
+    turn_rad: f64,
 }
 
 /// Labels every observation of runs that share one map frame.
@@ -70,37 +71,64 @@ pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<Label
 }
 
 /// Positions of a run a little travel apart; the first is always one of them.
-pub(super) fn samples_of(config: &SemanticsConfig, run_idx: usize, run: &DrivenRun<'_>) -> Vec<Sample> {
+fn samples_of(config: &SemanticsConfig, run_idx: usize, run: &DrivenRun<'_>) -> Vec<Sample> {
+    let poses = &run.map_from_observations;
+    let mut travel_m = vec![0.0];
+    for pair in poses.windows(2) {
+        travel_m.push(travel_m[travel_m.len() - 1] + pair[0].distance(&pair[1]));
+    }
     let mut samples: Vec<Sample> = Vec::new();
-    let mut travel_m = f64::INFINITY;
-    let mut last: Option<&Pose2> = None;
-    for (observation_idx, pose) in run.map_from_observations.iter().enumerate() {
-        travel_m += last.map_or(0.0, |last| last.distance(pose));
-        last = Some(pose);
-        if travel_m >= config.spacing_m - 1e-9 {
-            travel_m = 0.0;
-            samples.push(Sample { run_idx, observation_idx, position: pose.position() });
+    let mut next_m = 0.0;
+    for (observation_idx, pose) in poses.iter().enumerate() {
+        if travel_m[observation_idx] >= next_m - 1e-9 {
+            next_m = travel_m[observation_idx] + config.spacing_m;
+            let turn_rad = turn_at(config, poses, &travel_m, observation_idx);
+            samples.push(Sample { run_idx, observation_idx, position: pose.position(), turn_rad });
         }
+    }
+    widen_turns(config, samples)
+}
+
+/// Angle between the chords to a position from some travel before and from it to some travel after.
+fn turn_at(config: &SemanticsConfig, poses: &[Pose2], travel_m: &[f64], at: usize) -> f64 {
+    let before = travel_m.partition_point(|&travel| travel < travel_m[at] - config.turn_reach_m);
+    let after = travel_m.partition_point(|&travel| travel <= travel_m[at] + config.turn_reach_m) - 1;
+    let direction = |from: usize, to: usize| {
+        let (dx, dy) = (poses[to].x - poses[from].x, poses[to].y - poses[from].y);
+        (dx.hypot(dy) > 1e-6).then(|| dy.atan2(dx))
+    };
+    match (direction(before, at), direction(at, after)) {
+        (Some(entering), Some(leaving)) => angle_between(entering, leaving),
+        _ => 0.0,
+    }
+}
+
+/// A corner reaches a little beyond the place where the way turns most.
+fn widen_turns(config: &SemanticsConfig, mut samples: Vec<Sample>) -> Vec<Sample> {
+    let reach = (config.smoothing_m / config.spacing_m).round() as usize;
+    let turns: Vec<f64> = samples.iter().map(|sample| sample.turn_rad).collect();
+    for (at, sample) in samples.iter_mut().enumerate() {
+        let around = &turns[at.saturating_sub(reach)..(at + reach + 1).min(turns.len())];
+        sample.turn_rad = around.iter().copied().fold(0.0, f64::max);
     }
     samples
 }
 
 /// The surroundings of positions that lie in one block.
-fn read_block(
-    config: &SemanticsConfig,
-    runs: &[DrivenRun<'_>],
-    samples: &[Sample],
-) -> Vec<PlaceSignature> {
+fn read_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Vec<PlaceSignature> {
     let block = build_block(config, runs, samples);
     let mut reader = SignatureReader::new(config, &block);
     samples
         .iter()
-        .map(|sample| block.index(&sample.position).map_or_else(Default::default, |cell| reader.read(cell)))
+        .map(|sample| match block.index(&sample.position) {
+            Some(cell) => reader.read(cell, sample.turn_rad),
+            None => PlaceSignature::default(),
+        })
         .collect()
 }
 
 /// The map around positions, with the margin that their labels need.
-pub(super) fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Block {
+fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Block {
     let lowest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MAX, f64::min);
     let highest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MIN, f64::max);
     let (left, bottom) = (lowest(|p| p.x), lowest(|p| p.y));
@@ -138,8 +166,7 @@ fn label_run(
     run: &DrivenRun<'_>,
     signatures: Vec<(usize, PlaceSignature)>,
 ) -> LabelledRun {
-    let raw: Vec<PlaceLabel> =
-        signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
+    let raw: Vec<PlaceLabel> = signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
     let reach = (config.smoothing_m / config.spacing_m).round() as usize;
     let smooth: Vec<(PlaceLabel, f32)> = (0..raw.len()).map(|at| majority(&raw, at, reach)).collect();
     let num_observations = run.map_from_observations.len();

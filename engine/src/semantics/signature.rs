@@ -18,6 +18,8 @@ pub struct PlaceSignature {
     pub straightness: Option<f64>,
     /// Ways driven by any robot that leave the place and go on.
     pub num_driven: u32,
+    /// How much the driven way turns here, radians.
+    pub turn_rad: f64,
     /// Radius of the largest open disc that holds the position well inside, metres; 0 when none is as large as a hall.
     pub hall_radius_m: f64,
 }
@@ -34,23 +36,24 @@ impl<'a> SignatureReader<'a> {
         Self { config, block, flood: Flood::new(block.side * block.side) }
     }
 
-    /// The signature of a driven cell.
-    pub(super) fn read(&mut self, at: usize) -> PlaceSignature {
+    /// The signature of a driven cell, where the way turns by `turn_rad`.
+    pub(super) fn read(&mut self, at: usize, turn_rad: f64) -> PlaceSignature {
         let (config, block) = (self.config, self.block);
         let half_width_m = self.half_width_m(at);
         let clearance = |metres: f64| metres as f32;
 
         // Openings of doors are passages here, if they go on behind the door.
         let (door, wide) = (clearance(config.door_half_width_m), clearance(config.bend_half_width_m));
-        let near_m = (config.fork_near_m + config.fork_near_per_half_width * half_width_m)
-            .min(config.fork_near_max_m);
+        let near_m =
+            (config.fork_near_m + config.fork_near_per_half_width * half_width_m).min(config.fork_near_max_m);
         let far_m = near_m + config.fork_length_m;
         self.flood.pour(block, at, far_m, |index| block.clearance_m[index] >= door || block.is_driven[index]);
         let forks = self.flood.passages(block, near_m, far_m);
 
         // The shape of the passage itself is clearer without doors.
         let bend_m = config.bend_near_m + config.bend_length_m;
-        self.flood.pour(block, at, bend_m, |index| block.clearance_m[index] >= wide || block.is_driven[index]);
+        self.flood
+            .pour(block, at, bend_m, |index| block.clearance_m[index] >= wide || block.is_driven[index]);
         let arms = self.flood.passages(block, config.bend_near_m, bend_m);
 
         let driven_m = config.driven_near_m + config.driven_length_m;
@@ -61,6 +64,7 @@ impl<'a> SignatureReader<'a> {
             num_passages: forks.len() as u32,
             straightness: straightness(&arms, bend_m),
             num_driven: driven.len() as u32,
+            turn_rad,
             hall_radius_m: self.hall_radius_m(at),
         }
     }
@@ -89,7 +93,7 @@ impl<'a> SignatureReader<'a> {
 }
 
 /// Distance between the far ends of the two most opposite passages, over the way between them.
-pub(super) fn straightness(passages: &[Passage], reach_m: f64) -> Option<f64> {
+fn straightness(passages: &[Passage], reach_m: f64) -> Option<f64> {
     let mut widest: Option<f64> = None;
     for (position, a) in passages.iter().enumerate() {
         for b in &passages[..position] {
