@@ -10,6 +10,7 @@ use super::label::PlaceLabel;
 use super::rules::label_of;
 use super::signature::{PlaceSignature, SignatureReader};
 use crate::geometry::{Point2, Pose2, angle_between};
+use crate::mapping::{Keyframe, RunRecord};
 use crate::scan::ScanGeometry;
 
 /// One run, at its poses in the map.
@@ -21,6 +22,29 @@ pub struct DrivenRun<'a> {
     pub scans: Vec<(Pose2, &'a [f32])>,
     /// Where the observations were made, in order of travel.
     pub map_from_observations: Vec<Pose2>,
+}
+
+impl<'a> DrivenRun<'a> {
+    /// A run as the map builder placed it: scans at their keyframes' poses, observations carried along from the
+    /// last keyframe before each.
+    pub fn in_map(record: &RunRecord<'a>, map_from_keyframes: &[Pose2]) -> Self {
+        let placed: Vec<(&'a Keyframe, Pose2)> =
+            record.keyframes.iter().zip(map_from_keyframes.iter().copied()).collect();
+        let map_from_observations = record
+            .observations
+            .iter()
+            .map(|observation| {
+                let next = placed.partition_point(|(keyframe, _)| keyframe.scan_seq <= observation.scan_seq);
+                match placed.get(next.saturating_sub(1)) {
+                    Some((keyframe, map_from_keyframe)) => map_from_keyframe
+                        .compose(&keyframe.run_from_robot.between(&observation.run_from_robot)),
+                    None => observation.run_from_robot,
+                }
+            })
+            .collect();
+        let scans = placed.iter().map(|(keyframe, pose)| (*pose, keyframe.ranges_m.as_slice())).collect();
+        Self { geometry: record.geometry, scans, map_from_observations }
+    }
 }
 
 /// Labels of the observations of one run.
