@@ -63,7 +63,7 @@ impl Default for MappingConfig {
     fn default() -> Self {
         Self {
             retrieval: RetrievalConfig {
-                candidates_per_direction: 6,
+                candidates_per_window: 2,
                 query_step_m: 2.0,
                 ..RetrievalConfig::default()
             },
