@@ -6,16 +6,6 @@ use serde::{Deserialize, Serialize};
 use crate::config::ConfigError;
 use crate::geometry::Pose2;
 
-/// Everything about registering scans and submaps.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RegistrationConfig {
-    /// Scan against recent scans.
-    pub refiner: RefinerConfig,
-    /// Submap against submap.
-    pub submap: SubmapConfig,
-}
-
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -193,17 +183,6 @@ impl Default for RefinerConfig {
             search_radius_m: 20.0,
             odometry: OdometryNoise::default(),
         }
-    }
-}
-
-impl RegistrationConfig {
-    /// Checks every value; `path` is this struct's own path.
-    ///
-    /// # Errors
-    /// The first field that cannot work.
-    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        self.refiner.validate(&format!("{path}.refiner"))?;
-        self.submap.validate(&format!("{path}.submap"))
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::{Decision, Keyframe, MappingConfig, RunRecord, SiteMap, map_site};
+use locution_engine::mapping::{Decision, Keyframe, RunRecord, SiteMap, map_site};
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
@@ -118,14 +118,14 @@ fn written_run(run: &LoadedRun) -> WrittenRun {
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
-    _config: Arc<EngineConfig>,
+    config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
 ) -> Result<SiteMap, AppError> {
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
     let (memo, outcome) = on_blocking_thread(move || {
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site(&MappingConfig::default(), &records, &decisions, &mut memo);
+        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo);
         (memo, outcome)
     })
     .await?;

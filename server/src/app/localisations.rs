@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
 use locution_engine::localization::{
-    CellState, DensityFieldConfig, GridMap, LikelihoodFieldConfig, LocalizationState, Localizer, LocalizerConfig,
-    ServedMap,
+    CellState, DensityFieldConfig, GridMap, LikelihoodFieldConfig, LocalizationState, Localizer,
+    LocalizerConfig, ServedMap,
 };
 use locution_engine::scan::{Scan, ScanGeometry};
 
@@ -94,8 +94,11 @@ impl Search {
     }
 
     fn estimate(&self) -> (LocalizationState, f64, Vec<LocatedHypothesis>) {
-        let estimates: Vec<_> =
-            self.parts.iter().map(|(component, map, localizer)| (*component, localizer.estimate(map))).collect();
+        let estimates: Vec<_> = self
+            .parts
+            .iter()
+            .map(|(component, map, localizer)| (*component, localizer.estimate(map)))
+            .collect();
         let mut odds_sum = 0.0;
         let mut hypotheses = Vec::new();
         for (component, estimate) in &estimates {
@@ -173,14 +176,26 @@ impl App {
         let next_sequence = search.next_sequence;
         drop(search);
         let (state, travel_m, hypotheses) = on_blocking_thread(move || estimating.estimate()).await?;
-        Ok(LocalisationInfo { id, map_version: session.map_version, state, next_sequence, travel_m, hypotheses })
+        Ok(LocalisationInfo {
+            id,
+            map_version: session.map_version,
+            state,
+            next_sequence,
+            travel_m,
+            hypotheses,
+        })
     }
 
     /// Feeds a session. Scans it has seen are passed over; a gap is refused.
     ///
     /// # Errors
     /// [`AppError::Sequence`], [`AppError::Invalid`], [`AppError::NotFound`].
-    pub async fn localise(&self, site: &Site, id: u64, batch: NewBatch) -> Result<LocalisationInfo, AppError> {
+    pub async fn localise(
+        &self,
+        site: &Site,
+        id: u64,
+        batch: NewBatch,
+    ) -> Result<LocalisationInfo, AppError> {
         let session = self.session(site, id)?;
         let mut search = session.search.lock().await;
         let expected_sequence = search.next_sequence;
@@ -243,7 +258,12 @@ impl App {
         .await
     }
 
-    async fn new_search(&self, site: &Site, map: &MapRecord, geometry: &ScanGeometry) -> Result<Search, AppError> {
+    async fn new_search(
+        &self,
+        site: &Site,
+        map: &MapRecord,
+        geometry: &ScanGeometry,
+    ) -> Result<Search, AppError> {
         let mut sizes: BTreeMap<u32, u64> = BTreeMap::new();
         for run in map.runs.iter().filter(|run| run.num_poses > 0) {
             *sizes.entry(run.component).or_default() += run.num_poses;
@@ -259,7 +279,12 @@ impl App {
     }
 
     /// A component with the fields that localisation looks things up in.
-    async fn served_map(&self, site: &Site, map: &MapRecord, component: u32) -> Result<Arc<ServedMap>, AppError> {
+    async fn served_map(
+        &self,
+        site: &Site,
+        map: &MapRecord,
+        component: u32,
+    ) -> Result<Arc<ServedMap>, AppError> {
         let key = (site.name().to_string(), map.version, component);
         let mut served_maps = self.served_maps.lock().await;
         if let Some(served) = served_maps.get(&key) {

@@ -103,7 +103,10 @@ pub async fn upload_recording(
         uploaded.num_words = status.num_words;
     }
     uploaded.duration_s = began.elapsed().as_secs_f64();
-    bar.finish_with_message(format!("{} observations, {} words", uploaded.num_observations, uploaded.num_words));
+    bar.finish_with_message(format!(
+        "{} observations, {} words",
+        uploaded.num_observations, uploaded.num_words
+    ));
     Ok(uploaded)
 }
 
