@@ -195,7 +195,7 @@ impl ServerConfig {
             figment = figment.merge(Toml::file_exact(file));
         }
         let config: ServerConfig = figment
-            .merge(Env::prefixed("LOCUTION_").ignore(&["datasets", "golden", "key", "url"]).split("__"))
+            .merge(environment())
             .merge(Serialized::defaults(flags))
             .extract()
             .map_err(|error| ServerConfigError::Unreadable(Box::new(error)))?;
@@ -250,6 +250,16 @@ impl ServerConfig {
         }
         Ok(())
     }
+}
+
+/// Variables that begin with the name of a field. Others of the prefix belong to other tools, such as the tests.
+fn environment() -> Env {
+    const FIELDS: [&str; 7] = ["address", "data_directory", "limits", "storage", "builds", "log", "keys"];
+    let is_ours = |key: &figment::value::UncasedStr| {
+        let key = key.as_str().to_ascii_lowercase();
+        FIELDS.iter().any(|field| key == *field || key.starts_with(&format!("{field}__")))
+    };
+    Env::prefixed("LOCUTION_").filter(is_ours).split("__")
 }
 
 #[cfg(test)]

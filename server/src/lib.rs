@@ -25,6 +25,7 @@ pub mod error;
 pub mod extract;
 pub mod handlers;
 pub mod openapi;
+pub mod picture;
 pub mod router;
 pub mod state;
 pub mod storage;
@@ -102,6 +103,7 @@ pub async fn start_server(config: ServerConfig) -> Result<RunningServer, StartEr
     let listener = TcpListener::bind(config.address).await.map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
     let app = Arc::new(App::new(config.clone(), Arc::new(storage)));
+    app.resume().await?;
     let state = AppState {
         app: Arc::clone(&app),
         keys: Arc::new(auth::Keys::new(&config.keys)),

@@ -25,6 +25,7 @@ impl Process {
             .args(["serve", "--address", "127.0.0.1:0", "--data-directory"])
             .arg(directory)
             .env("LOCUTION_STORAGE__NUM_SCANS_PER_CHECKPOINT", "150")
+            .env_remove("LOCUTION_BIN")
             .env("LOCUTION_BUILDS__IS_AUTOMATIC", "false")
             .env("LOCUTION_LOG__FILTER", "error")
             .stdout(Stdio::piped())

@@ -19,6 +19,15 @@ struct Neighbours {
     place_sd_m: f64,
 }
 
+/// What one round of guided matching found.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct GuidedRound {
+    /// Fits that agree with the graph and with each other.
+    pub closures: Vec<Closure>,
+    /// All pairs of anchors that were registered.
+    pub tried: Vec<(usize, usize)>,
+}
+
 /// Registers all neighbours of one graph and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
@@ -29,7 +38,7 @@ pub(crate) fn guided_closures(
     components: &[u32],
     config: &MappingConfig,
     memo: &mut RegistrationMemo,
-) -> Result<Vec<Closure>, PoseGraphError> {
+) -> Result<GuidedRound, PoseGraphError> {
     let neighbours = find_neighbours(set, graph, components, config)?;
     let requests: Vec<Request> = neighbours.iter().map(|pair| pair.request).collect();
     let fits = memo.answers(&requests, set, &config.submap);
@@ -53,7 +62,8 @@ pub(crate) fn guided_closures(
         .filter(|(closure, uncertain)| !**uncertain || support(set, closure, &closures) >= config.min_support)
         .map(|(closure, _)| *closure)
         .collect();
-    Ok(supported)
+    let tried = requests.iter().map(|request| (request.earlier, request.later)).collect();
+    Ok(GuidedRound { closures: supported, tried })
 }
 
 /// What the graph's covariance does not know: submaps are not rigid.

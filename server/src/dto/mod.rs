@@ -2,6 +2,9 @@
 
 pub mod batches;
 pub mod common;
+pub mod jobs;
+pub mod localisations;
+pub mod maps;
 pub mod runs;
 pub mod sites;
 pub mod texts;
