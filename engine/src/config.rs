@@ -6,6 +6,8 @@ use thiserror::Error;
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
 use crate::matching::MatchingConfig;
+use crate::registration::RegistrationConfig;
+use crate::retrieval::RetrievalConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
 
@@ -34,6 +36,10 @@ pub struct EngineConfig {
     pub translator: TranslatorConfig,
     /// When stretches of text match.
     pub matching: MatchingConfig,
+    /// How scans and submaps are registered.
+    pub registration: RegistrationConfig,
+    /// How places are retrieved by their density profiles.
+    pub retrieval: RetrievalConfig,
 }
 
 impl EngineConfig {
@@ -43,7 +49,10 @@ impl EngineConfig {
     /// The first field that cannot work, by its path.
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.translator.validate("translator")?;
-        self.matching.validate("matching")
+        self.matching.validate("matching")?;
+        self.registration.validate("registration")?;
+        self.retrieval.validate("retrieval")?;
+        Ok(())
     }
 }
 

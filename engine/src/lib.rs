@@ -9,6 +9,8 @@
 //! [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
 //! [`simulation`] and [`evaluation`], which feed and judge it.
 
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
 pub mod config;
 pub mod density;
 pub mod evaluation;

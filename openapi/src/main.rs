@@ -1,3 +1,21 @@
 //! Writes `openapi/openapi.json` from the server's code; with `--check` fails when it is stale.
 
-fn main() {}
+use std::path::Path;
+
+use anyhow::{Context, bail};
+
+fn main() -> anyhow::Result<()> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi.json");
+    let current = serde_json::to_string_pretty(&locution_server::openapi::document())? + "\n";
+    if std::env::args().any(|argument| argument == "--check") {
+        let checked_in = std::fs::read_to_string(&path).context("openapi.json has not been written")?;
+        if checked_in != current {
+            bail!(
+                "openapi.json is stale: run `cargo run --release -p locution-openapi` and look at the difference"
+            );
+        }
+        return Ok(());
+    }
+    std::fs::write(&path, current).context("openapi.json cannot be written")?;
+    Ok(())
+}

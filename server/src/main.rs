@@ -1,3 +1,7 @@
 //! The `locution` binary: arguments, configuration, logging, start; nothing else.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    locution_server::cli::run()
+}

@@ -1,1 +1,8 @@
 //! Tests through the front door.
+#![allow(clippy::unwrap_used)]
+
+mod access;
+mod bad_input;
+mod batches;
+mod crash;
+mod sites;

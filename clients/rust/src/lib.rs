@@ -1,1 +1,43 @@
 //! Rust client of the Locution HTTP API.
+//!
+//! Speaks only what the API document says; it shares no code with the server. Metres, radians, integer
+//! nanoseconds.
+//!
+//! ```no_run
+//! # async fn example(geometry: locution_client::Geometry, scans: Vec<locution_client::Scan>)
+//! # -> Result<(), locution_client::ClientError> {
+//! use locution_client::{Client, Encoding, NewRun};
+//!
+//! let client = Client::new("http://127.0.0.1:7878")?;
+//! client.put_site("office", None).await?;
+//! let run = NewRun { robot: "robot-1".into(), geometry };
+//! let mut upload = client.start_upload("office", "monday", &run, Encoding::Cbor).await?;
+//! // After an interruption the upload begins where the server's copy ends.
+//! for batch in scans[upload.next_sequence() as usize..].chunks(100) {
+//!     upload.post(batch).await?;
+//! }
+//! client.finish_run("office", "monday").await?;
+//! client.build_map("office").await?;
+//! # Ok(())
+//! # }
+//! ```
+
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+mod client;
+mod error;
+mod localisations;
+mod maps;
+mod pages;
+mod runs;
+mod types;
+mod upload;
+
+pub use client::{Client, RetryPolicy};
+pub use error::{ClientError, Problem};
+pub use localisations::{Hypothesis, Localisation, LocalisationState};
+pub use types::{
+    BatchAnswer, Geometry, Job, MatchInterval, NewRun, Observation, PlaceMatch, Pose, RunStatus, Scan,
+    SiteStatus, StampedPose, Trajectory, Word, WordId,
+};
+pub use upload::{Encoding, RunUpload};

@@ -1,1 +1,31 @@
 //! What the evaluation reports measure (SPEC section 9), as pure functions.
+//!
+//! ```text
+//! truth at key frames ─► truth_join ─► a true pose per observation ─► Revisits ─┐
+//! matches ─► claims: pairs of observations said to be one place ────────────────┴► precision, recall, curve
+//! ```
+//! Beside it: map error against hand-verified relations, trajectory error against the truth, label confusion and the
+//! outcome of localisations. Nothing here knows how the answers were made.
+
+mod labels;
+mod localization;
+mod map_error;
+mod recognition;
+mod revisits;
+mod summary;
+mod trajectory_error;
+mod truth_join;
+
+pub use labels::{LabelReport, LabelScore, LabelledObservation, judge_labels};
+pub use localization::{
+    LocalizationReport, LocalizationTrial, MetresToConverge, TrialOutcome, judge_localization,
+};
+pub use map_error::{EstimatedPose, MapErrorReport, judge_map};
+pub use recognition::{
+    CurvePoint, JudgedMatch, RecallAtPrecision, RecognitionReport, RevisitCounts, VerifiedReport,
+    judge_recognition,
+};
+pub use revisits::{JudgedRun, Revisits, Visit, find_revisits};
+pub use summary::MeanSd;
+pub use trajectory_error::{TrajectoryError, judge_trajectory};
+pub use truth_join::{OdometryPose, join_truth};

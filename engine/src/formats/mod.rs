@@ -20,3 +20,12 @@ pub use labels::{LabelledPlaces, LabelledRegion};
 pub use map_server::{GrayImage, MapServerYaml, parse_map_server_yaml, parse_pgm, write_pgm};
 pub use relations::{Relation, parse_relations};
 pub use truth::{TruthPose, parse_truth, truth_text};
+mod g2o;
+mod graph_text;
+mod toro;
+mod tum;
+
+pub use g2o::{read_g2o, write_g2o};
+pub use graph_text::{GraphDocument, GraphTextError};
+pub use toro::{read_toro, write_toro};
+pub use tum::{read_tum, write_tum};

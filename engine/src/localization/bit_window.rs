@@ -19,9 +19,35 @@ pub(super) fn or<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| a[word] | b[word])
 }
 
+/// `a & !b`.
+pub(super) fn and_not<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
+    std::array::from_fn(|word| a[word] & !b[word])
+}
+
 /// True when no bit is set.
 pub(super) fn is_empty<const W: usize>(a: &Row<W>) -> bool {
     a.iter().fold(0, |all, word| all | word) == 0
+}
+
+/// Number of set bits.
+pub(super) fn count<const W: usize>(a: &Row<W>) -> u32 {
+    a.iter().map(|word| word.count_ones()).sum()
+}
+
+/// True when a bit is set.
+pub(super) fn has<const W: usize>(a: &Row<W>, bit: usize) -> bool {
+    a[bit / 64] >> (bit % 64) & 1 == 1
+}
+
+/// Positions of the set bits, ascending.
+pub(super) fn set_bits<const W: usize>(a: &Row<W>) -> impl Iterator<Item = usize> + use<W> {
+    (*a).into_iter().enumerate().flat_map(|(word, mut bits)| {
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| word * 64 + bits.trailing_zeros() as usize)?;
+            bits &= bits - 1;
+            Some(bit)
+        })
+    })
 }
 
 /// Every cell moved one to the right (towards higher bits).
@@ -32,19 +58,6 @@ pub(super) fn shifted_right<const W: usize>(a: &Row<W>) -> Row<W> {
 /// Every cell moved one to the left.
 pub(super) fn shifted_left<const W: usize>(a: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| (a[word] >> 1) | if word + 1 < W { a[word + 1] << 63 } else { 0 })
-}
-
-/// Every cell moved `count < 64` to the right.
-pub(super) fn shifted_by<const W: usize>(a: &Row<W>, count: usize) -> Row<W> {
-    if count == 0 {
-        return *a;
-    }
-    std::array::from_fn(|word| (a[word] << count) | if word > 0 { a[word - 1] >> (64 - count) } else { 0 })
-}
-
-/// True when the bit of a column is set.
-pub(super) fn has<const W: usize>(a: &Row<W>, column: usize) -> bool {
-    a[column / 64] >> (column % 64) & 1 == 1
 }
 
 /// The row whose bits `first..=last` are set; none when `last < first`.
@@ -93,50 +106,87 @@ pub(super) struct BitPlanes {
     words_per_row: usize,
     margin: usize,
     free: Vec<u64>,
-    unknown: Vec<u64>,
+    /// Free cells with an unknown neighbour.
+    open: Vec<u64>,
 }
 
 impl BitPlanes {
     /// The planes of a map with `margin` unknown cells on every side.
     pub fn new(map: &GridMap, margin: usize) -> Self {
         let words_per_row = (map.width() + 2 * margin).div_ceil(64) + 5;
-        let num_words = words_per_row * (map.height() + 2 * margin);
-        let mut planes =
-            Self { words_per_row, margin, free: vec![0; num_words], unknown: vec![u64::MAX; num_words] };
+        let num_rows = map.height() + 2 * margin;
+        let mut free = vec![0; words_per_row * num_rows];
+        let mut unknown = vec![u64::MAX; words_per_row * num_rows];
         for (row, states) in map.cells().chunks_exact(map.width()).enumerate() {
             let start = (row + margin) * words_per_row;
             for (column, state) in states.iter().enumerate() {
                 let (word, bit) = (start + (column + margin) / 64, 1u64 << ((column + margin) % 64));
-                match state {
-                    CellState::Unknown => continue,
-                    CellState::Free => planes.free[word] |= bit,
-                    CellState::Occupied => {}
+                if *state != CellState::Unknown {
+                    unknown[word] &= !bit;
                 }
-                planes.unknown[word] &= !bit;
+                if *state == CellState::Free {
+                    free[word] |= bit;
+                }
             }
         }
-        planes
+        let open =
+            beside(&unknown, words_per_row).iter().zip(&free).map(|(beside, free)| beside & free).collect();
+        Self { words_per_row, margin, free, open }
     }
 
-    /// `64 W` free bits of a row from a column on; both may be up to the margin outside the map.
-    pub fn free_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
-        self.row(&self.free, column, row)
+    /// A column or row of the map, counted from the margin's edge.
+    pub const fn padded(&self, cell: i64) -> usize {
+        (cell + self.margin as i64) as usize
     }
 
-    /// The same for unknown cells.
-    pub fn unknown_row<const W: usize>(&self, column: i64, row: i64) -> Row<W> {
-        self.row(&self.unknown, column, row)
+    /// `64 W` free bits from a padded cell on to the right.
+    pub fn free_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
+        self.row(&self.free, row, column)
     }
 
-    fn row<const W: usize>(&self, plane: &[u64], column: i64, row: i64) -> Row<W> {
-        let column = (column + self.margin as i64) as usize;
-        let start = (row + self.margin as i64) as usize * self.words_per_row + column / 64;
+    /// The same for free cells with an unknown neighbour.
+    pub fn open_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
+        self.row(&self.open, row, column)
+    }
+
+    /// True when a padded cell is free.
+    #[inline]
+    pub fn is_free(&self, row: usize, column: usize) -> bool {
+        self.free[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
+    }
+
+    /// True when a padded cell is free and has an unknown neighbour.
+    pub fn is_open(&self, row: usize, column: usize) -> bool {
+        self.open[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
+    }
+
+    /// Eight free bits from a padded cell on to the right.
+    pub fn free_byte(&self, row: usize, column: usize) -> u64 {
+        self.row::<1>(&self.free, row, column)[0] & 0xff
+    }
+
+    fn row<const W: usize>(&self, plane: &[u64], row: usize, column: usize) -> Row<W> {
+        let start = row * self.words_per_row + column / 64;
         let (words, shift) = (&plane[start..=start + W], column % 64);
         std::array::from_fn(|word| match shift {
             0 => words[word],
             _ => (words[word] >> shift) | (words[word + 1] << (64 - shift)),
         })
     }
+}
+
+/// Cells with a set neighbour above, below, left or right.
+fn beside(plane: &[u64], words_per_row: usize) -> Vec<u64> {
+    let word_at = |word: Option<usize>| word.and_then(|word| plane.get(word)).copied().unwrap_or(0);
+    (0..plane.len())
+        .map(|word| {
+            let sideways = plane[word] << 1
+                | plane[word] >> 1
+                | word_at(word.checked_sub(1)) >> 63
+                | word_at(word.checked_add(1)) << 63;
+            sideways | word_at(word.checked_sub(words_per_row)) | word_at(word.checked_add(words_per_row))
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,272 +1,290 @@
 //! Free-space density of every cell of a map: the free cells inside a disc that hang together with its centre.
 //!
-//! Algorithm 3.1 floods a disc per cell. Neighbouring discs share nearly everything, so here the centres are taken in
-//! square blocks, and the flood of a block starts from what all its discs have in common:
+//! Algorithm 3.1 floods a disc per cell. Here a disc slides along a row of centres and its fill is kept up to date:
+//! one arc of cells leaves on the left, one enters on the right ([`super::arc_planes`] has them as words, a bit per row
+//! of the disc).
 //!
 //! ```text
-//!   root of 16 × 16 centres: flood the intersection of their discs
-//!     └─ 16 nodes of 4 × 4: that fill is connected in the larger intersection too, flood on from it
-//!          └─ 16 centres each: the whole disc, flood on from there
+//!        leaving   ┌──────────┐   entering        What leaves is harmless when what it touches inside the disc hangs
+//!            ░▒░   │          │  ▒                together without it: the cells to its right have no gap, or a gap
+//!            ▒     │    c c'  │   ▒               that a square of 8 × 8 cells can bridge. Otherwise the fill might
+//!            ░▒░   │          │  ▒                fall apart, and the disc is flooded afresh.
+//!                  └──────────┘
 //! ```
 //!
-//! What was reached in an intersection of discs is reached in each of them, so a leaf only adds the thin lune that its
-//! own disc has more. Centres that do not hang together in the intersection form groups of their own. Rows are bits
-//! ([`super::bit_window`]), so a step of the flood handles 64 cells.
+//! The fill itself is kept as the arcs through which its cells entered: cell (x, row) is bit `row` of `reach[x − half
+//! chord of the row]`. So what enters is one word, and what leaves is gathered from one word per length of chord.
 
+use super::arc_planes::{ArcPlanes, DiscShape};
 use super::bit_window::{
-    BitPlanes, Row, and, has, is_empty, or, shifted_by, shifted_left, shifted_right, span, spread,
+    BitPlanes, Row, and, and_not, count, has, is_empty, or, set_bits, shifted_left, shifted_right, span,
+    spread,
 };
 use super::kernel_rows::KernelRows;
 
-/// Sides of the blocks of centres, from the root to the single centre.
-const SIDES: [usize; 3] = [BLOCK_SIDE, 4, 1];
+/// Cells per side of the square in which a gap may be bridged.
+const BRIDGE: usize = 8;
 
-/// Centres per side of a root block.
-pub(super) const BLOCK_SIDE: usize = 16;
-
-/// Cells by which the planes of bits must reach beyond the map, on top of the disc's radius.
-pub(super) const MARGIN: usize = BLOCK_SIDE + 2;
+/// The leftmost column of that square.
+const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 
 /// What a flood found at a centre.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Fill {
     /// Kernel mass of the connected free cells, in [0, 1].
     pub density: f32,
-    /// Unknown cells next to them, inside the disc.
-    pub num_unknown: u32,
+    /// How many of them have an unknown neighbour.
+    pub num_open: u32,
 }
 
-/// What the floods found at the centres of a block, row by row.
-pub(super) type Block = [[Option<Fill>; BLOCK_SIDE]; BLOCK_SIDE];
-
-/// A flooder with rows as wide as its kernel needs.
-pub(super) enum AnyFlooder<'a> {
-    /// One word per row.
-    Narrow(BlockFlooder<'a, 1>),
-    /// Two words: up to 5.6 m at 0.1 m per cell.
-    Middle(BlockFlooder<'a, 2>),
-    /// Four words.
-    Wide(BlockFlooder<'a, 4>),
-    /// Eight words.
-    Widest(BlockFlooder<'a, 8>),
-}
-
-impl<'a> AnyFlooder<'a> {
-    /// The narrowest flooder whose window holds a block and the kernel around it.
-    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
-        match 2 * kernel.radius() + BLOCK_SIDE {
-            0..=64 => Self::Narrow(BlockFlooder::new(planes, kernel)),
-            65..=128 => Self::Middle(BlockFlooder::new(planes, kernel)),
-            129..=256 => Self::Wide(BlockFlooder::new(planes, kernel)),
-            _ => Self::Widest(BlockFlooder::new(planes, kernel)),
-        }
-    }
-
-    /// Fills of the `side × side` centres from (column, row) on, row by row; None where the centre is not free.
-    pub fn flood_block(&mut self, column: i64, row: i64, side: usize) -> Block {
-        match self {
-            Self::Narrow(flooder) => flooder.flood_block(column, row, side),
-            Self::Middle(flooder) => flooder.flood_block(column, row, side),
-            Self::Wide(flooder) => flooder.flood_block(column, row, side),
-            Self::Widest(flooder) => flooder.flood_block(column, row, side),
-        }
-    }
-}
-
-/// Floods blocks of centres; owns the scratch rows of one thread.
-pub(super) struct BlockFlooder<'a, const W: usize> {
+/// A disc that slides along rows of centres; owns the scratch words of one thread.
+pub(super) struct DiscSweep<'a, const W: usize> {
     planes: &'a BitPlanes,
     kernel: &'a KernelRows,
-    /// Per level: the intersection of the discs of a block whose lower left centre has column 0, from its first row.
-    intersections: [Vec<Row<W>>; SIDES.len()],
-    free: Vec<Row<W>>,
-    unknown: Vec<Row<W>>,
-    /// Free cells inside the intersection of each level.
-    masks: [Vec<Row<W>>; SIDES.len()],
-    reaches: [Vec<Row<W>>; SIDES.len()],
+    shape: DiscShape<W>,
+    arcs: ArcPlanes<W>,
+    /// The fill, by the arcs through which its cells entered.
+    reach: Vec<Row<W>>,
+    /// The fill of the last flood afresh, row by row.
+    rows: Vec<Row<W>>,
+    /// First row of the disc and first column of the arcs, counted in padded cells.
+    bottom: usize,
+    left: usize,
+    num_reached: u32,
+    num_open: u32,
+    stack: Vec<(usize, usize)>,
 }
 
-impl<'a, const W: usize> BlockFlooder<'a, W> {
-    /// A flooder for discs of a kernel; the window of a block must fit: `2 radius + 16 ≤ 64 W`.
-    fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
-        let num_rows = 2 * kernel.radius() + BLOCK_SIDE;
-        let empty = || vec![[0; W]; num_rows];
+impl<'a, const W: usize> DiscSweep<'a, W> {
+    /// A sweep of a kernel whose disc must fit into `64 W` rows and columns.
+    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
+        let shape = DiscShape::new(kernel);
         Self {
             planes,
             kernel,
-            intersections: SIDES.map(|side| intersection_of_discs(kernel, side)),
-            free: empty(),
-            unknown: empty(),
-            masks: SIDES.map(|_| empty()),
-            reaches: SIDES.map(|_| empty()),
+            rows: vec![[0; W]; shape.num_rows()],
+            shape,
+            arcs: ArcPlanes::default(),
+            reach: Vec::new(),
+            bottom: 0,
+            left: 0,
+            num_reached: 0,
+            num_open: 0,
+            stack: Vec::new(),
         }
     }
 
-    /// Fills of the `side × side` centres from (column, row) on, row by row; None where the centre is not free.
-    fn flood_block(&mut self, column: i64, row: i64, side: usize) -> Block {
-        let mut fills = [[None; BLOCK_SIDE]; BLOCK_SIDE];
+    /// Fills of the centres of a row from `column` on; None where the centre is not free.
+    pub fn sweep(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
         let radius = self.kernel.radius();
-        let (left, bottom) = (column - radius as i64, row - radius as i64);
-        for window_row in 0..self.free.len() {
-            self.free[window_row] = self.planes.free_row(left, bottom + window_row as i64);
-            self.unknown[window_row] = self.planes.unknown_row(left, bottom + window_row as i64);
+        let can_slide = self.kernel.is_uniform() && radius > 2;
+        self.bottom = self.planes.padded(row) - radius;
+        self.left = self.planes.padded(column) - 2 * radius;
+        let num_arcs = fills.len() + 2 * radius + 1;
+        self.reach.clear();
+        self.reach.resize(num_arcs, [0; W]);
+        if can_slide {
+            self.arcs.cut(self.planes, &self.shape, (self.left, self.bottom), num_arcs);
         }
-        let mut centres = [0u16; BLOCK_SIDE];
-        for (y, bits) in centres.iter_mut().enumerate().take(side) {
-            for x in 0..side {
-                *bits |= u16::from(has(&self.free[y + radius], x + radius)) << x;
+        let mut was_free = false;
+        for (arc, fill) in (2 * radius..).zip(fills) {
+            let is_free = self.is_free(radius, self.left + arc);
+            if is_free && !(was_free && can_slide && self.slide_to(arc)) {
+                self.flood(arc, can_slide);
+            }
+            *fill = is_free.then(|| self.read());
+            was_free = is_free;
+        }
+    }
+
+    /// Moves the disc to the centre `arc` from the one on its left; false when the fill might fall apart.
+    fn slide_to(&mut self, arc: usize) -> bool {
+        let leaving = self.shape.leaving(&self.reach, arc - 1);
+        if !self.is_safe(&leaving, arc - 1) {
+            return false;
+        }
+        self.num_reached -= count(&leaving);
+        self.num_open -= count(&and(&leaving, &self.arcs.leaving_open[arc - 1]));
+        self.enter(arc);
+        true
+    }
+
+    /// True when the fill stays in one piece as the reached cells `leaving` leave the disc around `arc`.
+    fn is_safe(&self, leaving: &Row<W>, arc: usize) -> bool {
+        let beside = and(&self.arcs.leaving_free[arc + 1], leaving);
+        let links = &self.shape.links;
+        // Free cells on the right that have a leaving cell below them but no free one beside that: the end of a gap.
+        let starts = and_not(&beside, &shifted_right(&and(&beside, links)));
+        let gap_ends = and(&starts, &shifted_right(&and(leaving, links)));
+        // Inner neighbours that stay, where the step over their corner is blocked.
+        let corner = and(&beside, &self.arcs.leaving_inner[arc + 1]);
+        let blocked = and_not(&and(leaving, &self.arcs.leaving_inner[arc]), &corner);
+        if is_empty(&gap_ends) && is_empty(&blocked) {
+            return true;
+        }
+        set_bits(&gap_ends).all(|row| self.is_gap_harmless(leaving, &beside, row, arc))
+            && set_bits(&blocked).all(|row| self.is_corner_harmless(leaving, &beside, row, arc))
+    }
+
+    /// True when the gap below a free cell is the run's end or can be bridged.
+    fn is_gap_harmless(&self, leaving: &Row<W>, beside: &Row<W>, row: usize, arc: usize) -> bool {
+        let mut lower = row;
+        while lower > 0 && has(&self.shape.links, lower - 1) && has(leaving, lower - 1) {
+            lower -= 1;
+            if has(beside, lower) {
+                return self.is_bridged(lower, row, self.left + arc + 1 - self.shape.half_chords[row]);
             }
         }
-        self.flood_node(0, (0, 0), &centres, false, &mut fills);
-        fills
+        true
     }
 
-    /// Floods the wanted `centres` of a node; `from_parent` says that they all hang together with the parent's reach.
-    fn flood_node(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        centres: &[u16; BLOCK_SIDE],
-        from_parent: bool,
-        fills: &mut Block,
-    ) {
-        let mut remaining = wanted_within(centres, corner, SIDES[level]);
-        if remaining.iter().all(|&bits| bits == 0) {
-            return;
-        }
-        let rows = self.mask_node(level, corner);
-        if from_parent {
-            let group = std::mem::replace(&mut remaining, [0; BLOCK_SIDE]);
-            let parent_side = SIDES[level - 1];
-            let parent_rows = self.rows_of(parent_side, corner.1 / parent_side * parent_side);
-            let (before, after) = self.reaches.split_at_mut(level);
-            for row in rows.clone() {
-                let is_shared = parent_rows.contains(&row);
-                after[0][row] =
-                    if is_shared { and(&before[level - 1][row], &self.masks[level][row]) } else { [0; W] };
-            }
-            self.settle(level, rows.clone());
-            self.descend(level, corner, &group, fills);
-        }
-        let radius = self.kernel.radius();
-        while let Some((x, y)) = first_set(&remaining) {
-            self.reaches[level][rows.clone()].fill([0; W]);
-            let mut group = [0; BLOCK_SIDE];
-            let is_inside = rows.contains(&(y + radius)) && has(&self.masks[level][y + radius], x + radius);
-            if is_inside {
-                self.reaches[level][y + radius] = span((x + radius) as i64, (x + radius) as i64);
-                self.settle(level, rows.clone());
-                group = self.reached_of(level, &remaining);
-                for (left, taken) in remaining.iter_mut().zip(&group) {
-                    *left &= !taken;
-                }
-                self.descend(level, corner, &group, fills);
-            } else {
-                // The intersection of a small kernel's discs may not even hold its own centres.
-                group[y] = 1 << x;
-                remaining[y] &= !(1 << x);
-                self.descend_alone(level, corner, &group, fills);
-            }
-        }
-    }
-
-    /// Hands a settled group to the children, or reads the result at a leaf.
-    fn descend(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        group: &[u16; BLOCK_SIDE],
-        fills: &mut Block,
-    ) {
-        if level + 1 == SIDES.len() {
-            fills[corner.1][corner.0] = Some(self.read(level, corner));
-            return;
-        }
-        for child in children(level, corner) {
-            self.flood_node(level + 1, child, group, true, fills);
-        }
-    }
-
-    /// Hands a centre outside the intersection to its child, which starts afresh.
-    fn descend_alone(
-        &mut self,
-        level: usize,
-        corner: (usize, usize),
-        group: &[u16; BLOCK_SIDE],
-        fills: &mut Block,
-    ) {
-        for child in children(level, corner) {
-            self.flood_node(level + 1, child, group, false, fills);
-        }
-    }
-
-    /// Rows of the window that the intersection of a node's discs may cover; `y` is its first row of centres.
-    fn rows_of(&self, side: usize, y: usize) -> std::ops::Range<usize> {
-        let first = y + side - 1;
-        first..(y + 2 * self.kernel.radius() + 1).max(first)
-    }
-
-    /// Writes the free cells of a node's intersection into its mask; returns the rows it covers.
-    fn mask_node(&mut self, level: usize, (x, y): (usize, usize)) -> std::ops::Range<usize> {
-        let rows = self.rows_of(SIDES[level], y);
-        for row in rows.clone() {
-            let disc = shifted_by(&self.intersections[level][row - y], x);
-            self.masks[level][row] = and(&self.free[row], &disc);
-        }
-        rows
-    }
-
-    /// Floods the reach of a level within its mask, by alternating passes until one changes nothing.
-    fn settle(&mut self, level: usize, rows: std::ops::Range<usize>) {
-        let (reach, mask) = (&mut self.reaches[level][rows.clone()], &self.masks[level][rows]);
-        let num_rows = reach.len();
-        let mut passes = 0;
+    /// True when the inner neighbour of a leaving run touches the cells beside the run some other way.
+    fn is_corner_harmless(&self, leaving: &Row<W>, beside: &Row<W>, row: usize, arc: usize) -> bool {
+        let is_lower_half = row < self.kernel.radius();
+        let inner = if is_lower_half { row + 1 } else { row - 1 };
+        let column = self.left + arc - self.shape.half_chords[row];
+        let mut nearest = row;
         loop {
-            let mut has_changed = false;
-            let mut before = [0; W];
-            for step in 0..num_rows {
-                let row = if passes % 2 == 0 { step } else { num_rows - 1 - step };
-                before = grow(&before, &mut reach[row], &mask[row], &mut has_changed);
+            if has(beside, nearest) {
+                return self.is_free(inner, column + 1) && self.is_bridged(nearest, inner, column + 1);
             }
-            passes += 1;
-            if !has_changed && passes > 1 {
-                return;
+            let outer = if is_lower_half { nearest.wrapping_sub(1) } else { nearest + 1 };
+            let is_linked = outer < self.shape.num_rows() && has(&self.shape.links, outer.min(nearest));
+            if !is_linked || !has(leaving, outer) {
+                return true;
+            }
+            nearest = outer;
+        }
+    }
+
+    /// True when two free cells of a column hang together within the eight columns from it on and the rows between
+    /// them and one beside, all of which the disc must hold.
+    fn is_bridged(&self, first: usize, second: usize, column: usize) -> bool {
+        let (low, high) = (first.min(second).saturating_sub(1), first.max(second) + 1);
+        if high >= self.shape.num_rows() || high - low >= BRIDGE {
+            return false;
+        }
+        let mut board = 0u64;
+        let own = self.shape.half_chords[first].min(self.shape.half_chords[second]);
+        for row in low..=high {
+            let half = self.shape.half_chords[row];
+            if half >= own && half >= BRIDGE {
+                board |= self.planes.free_byte(self.bottom + row, column) << (BRIDGE * (row - low));
+            }
+        }
+        let goal = 1u64 << (BRIDGE * (second - low));
+        let mut reached = 1u64 << (BRIDGE * (first - low)) & board;
+        loop {
+            let sideways = (reached << 1 & !FIRST_COLUMN) | (reached >> 1 & !(FIRST_COLUMN << (BRIDGE - 1)));
+            let next = (reached | sideways | reached << BRIDGE | reached >> BRIDGE) & board;
+            if next & goal != 0 || next == reached {
+                return next & goal != 0;
+            }
+            reached = next;
+        }
+    }
+
+    /// Takes the right arc of the disc around `arc` into the fill, and whatever hangs on it.
+    fn enter(&mut self, arc: usize) {
+        let free = self.arcs.entering_free[arc];
+        let (reached_inside, free_inside) = self.shape.inner(&self.reach, &self.arcs.entering_free, arc);
+        let on_left = self.reach[arc - 1];
+        let mut joined = and(&free, &or(&on_left, &reached_inside));
+        loop {
+            let links = &self.shape.links;
+            let beside = or(&shifted_right(&and(&joined, links)), &and(&shifted_left(&joined), links));
+            let more = and_not(&and(&free, &beside), &joined);
+            if is_empty(&more) {
+                break;
+            }
+            joined = or(&joined, &more);
+        }
+        self.reach[arc] = joined;
+        self.num_reached += count(&joined);
+        self.num_open += count(&and(&joined, &self.arcs.entering_open[arc]));
+        let missed_left = and_not(&self.arcs.entering_free[arc - 1], &on_left);
+        let missed = or(&missed_left, &and_not(&free_inside, &reached_inside));
+        for row in set_bits(&and(&joined, &missed)) {
+            self.stack.push((row, self.left + arc + self.shape.half_chords[row]));
+        }
+        self.flood_on(arc);
+    }
+
+    /// Spreads from the cells on the stack, cell by cell.
+    fn flood_on(&mut self, arc: usize) {
+        let centre = self.left + arc;
+        while let Some((row, column)) = self.stack.pop() {
+            for (row, column) in
+                [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)]
+            {
+                if row >= self.shape.num_rows() || column.abs_diff(centre) > self.shape.half_chords[row] {
+                    continue;
+                }
+                let entered = column - self.shape.half_chords[row] - self.left;
+                if self.is_free(row, column) && !has(&self.reach[entered], row) {
+                    self.reach[entered][row / 64] |= 1 << (row % 64);
+                    self.num_reached += 1;
+                    self.num_open += u32::from(self.planes.is_open(self.bottom + row, column));
+                    self.stack.push((row, column));
+                }
             }
         }
     }
 
-    fn reached_of(&self, level: usize, centres: &[u16; BLOCK_SIDE]) -> [u16; BLOCK_SIDE] {
+    /// Floods the disc around `arc` from nothing; `keeps` says whether the disc may slide on.
+    fn flood(&mut self, arc: usize, keeps: bool) {
         let radius = self.kernel.radius();
-        std::array::from_fn(|y| {
-            let row = &self.reaches[level][y + radius];
-            (0..BLOCK_SIDE).fold(0, |bits, x| {
-                let is_reached = centres[y] >> x & 1 == 1 && has(row, x + radius);
-                bits | u16::from(is_reached) << x
-            })
-        })
+        let left = self.left + arc - radius;
+        let disc = |row: usize, bits: Row<W>| and(&bits, &self.shape.disc[row]);
+        let masks: Vec<Row<W>> = (0..self.shape.num_rows())
+            .map(|row| disc(row, self.planes.free_row(self.bottom + row, left)))
+            .collect();
+        self.rows.fill([0; W]);
+        self.rows[radius] = span(radius as i64, radius as i64);
+        settle(&mut self.rows, &masks, radius);
+        self.num_reached = self.rows.iter().map(count).sum();
+        let open = |(row, reached): (usize, &Row<W>)| {
+            count(&and(reached, &self.planes.open_row(self.bottom + row, left)))
+        };
+        self.num_open = self.rows.iter().enumerate().map(open).sum();
+        if keeps {
+            self.shape.by_arcs(&self.rows, &mut self.reach[arc - 2 * radius..=arc]);
+        }
     }
 
-    /// Kernel mass and unknown neighbours of a settled leaf.
-    fn read(&self, level: usize, (x, y): (usize, usize)) -> Fill {
-        let num_rows = 2 * self.kernel.radius() + 1;
-        let reach = &self.reaches[level][y..y + num_rows];
-        let mut num_unknown = 0;
-        let mut before = [0; W];
-        for row in 0..num_rows {
-            let after = if row + 1 < num_rows { reach[row + 1] } else { [0; W] };
-            let beside = or(&shifted_left(&reach[row]), &shifted_right(&reach[row]));
-            let touched = and(&or(&or(&before, &after), &beside), &self.unknown[y + row]);
-            if !is_empty(&touched) {
-                let disc = shifted_by(&self.intersections[level][row], x);
-                num_unknown += and(&touched, &disc).iter().map(|word| word.count_ones()).sum::<u32>();
-            }
-            before = reach[row];
-        }
-        Fill { density: self.kernel.mass(reach, x), num_unknown }
+    fn read(&self) -> Fill {
+        let density = self
+            .kernel
+            .mass_of_count(self.num_reached)
+            .unwrap_or_else(|| self.kernel.mass(self.rows.iter().copied()));
+        Fill { density, num_open: self.num_open }
+    }
+
+    fn is_free(&self, row: usize, column: usize) -> bool {
+        self.planes.is_free(self.bottom + row, column)
     }
 }
 
-/// Adds to a row what the row `before` and its own cells lead to; returns the row.
+/// Floods `reach` within `masks`, by alternating passes until one changes nothing; starts at the `middle` row.
+fn settle<const W: usize>(reach: &mut [Row<W>], masks: &[Row<W>], middle: usize) {
+    let num_rows = reach.len();
+    reach[middle] = spread(&reach[middle], &masks[middle]);
+    let mut passes = 0;
+    loop {
+        let mut has_changed = false;
+        let mut before = [0; W];
+        for step in 0..num_rows {
+            let row = if passes % 2 == 0 { step } else { num_rows - 1 - step };
+            before = grow(&before, &mut reach[row], &masks[row], &mut has_changed);
+        }
+        passes += 1;
+        if !has_changed && passes > 1 {
+            return;
+        }
+    }
+}
+
+/// Adds to a row what the row `before` leads to; returns the row.
 fn grow<const W: usize>(
     before: &Row<W>,
     reach: &mut Row<W>,
@@ -274,43 +292,11 @@ fn grow<const W: usize>(
     has_changed: &mut bool,
 ) -> Row<W> {
     let seed = or(reach, &and(before, mask));
-    let beside = or(&shifted_left(&seed), &shifted_right(&seed));
-    let has_more = (0..W).fold(0, |more, word| more | (beside[word] & mask[word] & !seed[word])) != 0;
-    let grown = if has_more { spread(&seed, mask) } else { seed };
-    *has_changed |= grown != *reach;
-    *reach = grown;
-    grown
-}
-
-fn wanted_within(centres: &[u16; BLOCK_SIDE], (x, y): (usize, usize), side: usize) -> [u16; BLOCK_SIDE] {
-    let columns = ((1u32 << side) - 1) << x;
-    std::array::from_fn(|row| if (y..y + side).contains(&row) { centres[row] & columns as u16 } else { 0 })
-}
-
-fn first_set(centres: &[u16; BLOCK_SIDE]) -> Option<(usize, usize)> {
-    let y = centres.iter().position(|&bits| bits != 0)?;
-    Some((centres[y].trailing_zeros() as usize, y))
-}
-
-fn children(level: usize, (x, y): (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
-    let (side, child) = (SIDES[level], SIDES[level + 1]);
-    (0..side / child)
-        .flat_map(move |row| (0..side / child).map(move |column| (x + column * child, y + row * child)))
-}
-
-/// Rows of the intersection of the discs of `side × side` centres, the lower left of which has column `radius`.
-fn intersection_of_discs<const W: usize>(kernel: &KernelRows, side: usize) -> Vec<Row<W>> {
-    let radius = kernel.radius() as i64;
-    (0..2 * radius + side as i64)
-        .map(|row| {
-            let y = row - radius;
-            let farthest = y.abs().max((y - (side as i64 - 1)).abs());
-            match kernel.half_chord(farthest as usize) {
-                Some(half) => span(side as i64 - 1 - half as i64 + radius, half as i64 + radius),
-                None => [0; W],
-            }
-        })
-        .collect()
+    if seed != *reach {
+        *reach = spread(&seed, mask);
+        *has_changed = true;
+    }
+    *reach
 }
 
 #[cfg(test)]
@@ -322,6 +308,7 @@ mod tests {
 
     use super::*;
     use crate::geometry::Point2;
+    use crate::localization::arc_planes::margin;
     use crate::localization::grid_map::{CellState, GridMap};
     use crate::localization::kernel_rows::KernelProfile;
 
@@ -336,7 +323,7 @@ mod tests {
             let d = (dx as f64).hypot(dy as f64);
             whole += if d < h { profile.height(d, h) } else { 0.0 };
         }
-        let mut num_unknown = 0;
+        let mut num_open = 0;
         let mut seen = HashSet::from([centre]);
         let mut queue = VecDeque::from([centre]);
         while let Some((x, y)) = queue.pop_front() {
@@ -344,20 +331,15 @@ mod tests {
             if d >= h {
                 continue;
             }
-            match map.state(x, y) {
-                CellState::Free => mass += profile.height(d, h),
-                CellState::Unknown => num_unknown += 1,
-                CellState::Occupied => {}
+            if map.state(x, y) != CellState::Free {
+                continue;
             }
-            if map.state(x, y) == CellState::Free {
-                queue.extend(
-                    [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)]
-                        .iter()
-                        .filter(|&&cell| seen.insert(cell)),
-                );
-            }
+            mass += profile.height(d, h);
+            let around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
+            num_open += u32::from(around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown));
+            queue.extend(around.iter().filter(|&&cell| seen.insert(cell)));
         }
-        Some(Fill { density: (mass / whole) as f32, num_unknown })
+        Some(Fill { density: (mass / whole) as f32, num_open })
     }
 
     /// Rooms with doors and clutter, and a part nobody has seen.
@@ -382,8 +364,20 @@ mod tests {
         map
     }
 
+    fn sweep_all(map: &GridMap, planes: &BitPlanes, kernel: &KernelRows) -> Vec<Option<Fill>> {
+        let mut fills = vec![None; map.width() * map.height()];
+        for (row, fills) in fills.chunks_exact_mut(map.width()).enumerate() {
+            if kernel.radius() < 32 {
+                DiscSweep::<1>::new(planes, kernel).sweep(0, row as i64, fills);
+            } else {
+                DiscSweep::<2>::new(planes, kernel).sweep(0, row as i64, fills);
+            }
+        }
+        fills
+    }
+
     #[test]
-    fn blocks_agree_with_the_literal_flood() {
+    fn sliding_discs_agree_with_the_literal_flood() {
         let mut rng = ChaCha8Rng::seed_from_u64(31);
         let cases =
             [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
@@ -391,27 +385,22 @@ mod tests {
             for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
                 let map = random_building(&mut rng, width, height);
                 let kernel = KernelRows::new(profile, h);
-                let planes = BitPlanes::new(&map, kernel.radius() + MARGIN);
-                let mut flooder = AnyFlooder::new(&planes, &kernel);
-                for (left, bottom) in
-                    (0..width).step_by(16).flat_map(|x| (0..height).step_by(16).map(move |y| (x, y)))
-                {
-                    let block = flooder.flood_block(left as i64, bottom as i64, 16);
-                    for (x, y) in (0..16).flat_map(|x| (0..16).map(move |y| (x, y))) {
-                        let cell = ((left + x) as i64, (bottom + y) as i64);
-                        if h > 10.0 && rng.random_range(0..8) > 0 {
-                            continue;
+                let planes = BitPlanes::new(&map, margin(&kernel));
+                let fills = sweep_all(&map, &planes, &kernel);
+                for (cell, fast) in fills.iter().enumerate() {
+                    let cell = ((cell % width) as i64, (cell / width) as i64);
+                    if h > 10.0 && rng.random_range(0..8) > 0 {
+                        continue;
+                    }
+                    match (fast, literal_fill(&map, cell, profile, h)) {
+                        (Some(fast), Some(slow)) => {
+                            assert_eq!(fast.num_open, slow.num_open, "h {h} at {cell:?}");
+                            assert!(
+                                (fast.density - slow.density).abs() < 1e-5,
+                                "{fast:?} {slow:?} h {h} at {cell:?}"
+                            );
                         }
-                        match (block[y][x], literal_fill(&map, cell, profile, h)) {
-                            (Some(fast), Some(slow)) => {
-                                assert_eq!(fast.num_unknown, slow.num_unknown, "h {h} at {cell:?}");
-                                assert!(
-                                    (fast.density - slow.density).abs() < 1e-5,
-                                    "{fast:?} {slow:?} h {h} at {cell:?}"
-                                );
-                            }
-                            (fast, slow) => assert_eq!(fast, slow, "h {h} at {cell:?}"),
-                        }
+                        (fast, slow) => assert_eq!(*fast, slow, "h {h} at {cell:?}"),
                     }
                 }
             }

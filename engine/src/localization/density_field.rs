@@ -11,8 +11,9 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::arc_planes::margin;
 use super::bit_window::BitPlanes;
-use super::connected_disc::{AnyFlooder, BLOCK_SIDE, Fill, MARGIN};
+use super::connected_disc::{DiscSweep, Fill};
 use super::density_gradient::{GradientConfig, stable_descent};
 use super::grid_map::{CellState, GridMap};
 use super::kernel_rows::{KernelProfile, KernelRows};
@@ -41,7 +42,8 @@ pub struct DensityFieldConfig {
     pub profile: KernelProfile,
     /// Bandwidth of each kernel, metres; one to four (thesis 3.3.2.2: 15, 30 and 50 cells of 0.1 m).
     pub bandwidths_m: Vec<f64>,
-    /// Unknown cells that a flood may touch and still be hard, as a share of the kernel's perimeter; 0 is literal.
+    /// Reached cells that may border on unknown ones while the density is still hard, as a share of the kernel's
+    /// perimeter; 0 is literal.
     pub unknown_tolerance: f64,
     /// Where the gradient counts.
     pub gradient: GradientConfig,
@@ -247,29 +249,56 @@ fn kernel_codes(map: &GridMap, config: &DensityFieldConfig, bandwidth_m: f64) ->
 /// Hard density of every cell for one kernel, NaN where it is undefined or the cell is not free.
 fn hard_densities(map: &GridMap, config: &DensityFieldConfig, bandwidth_cells: f64) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
-    let planes = BitPlanes::new(map, kernel.radius() + MARGIN);
-    let (width, height) = (map.width(), map.height());
-    let mut densities = vec![f32::NAN; width * height];
-    densities.par_chunks_mut(width * BLOCK_SIDE).enumerate().for_each(|(block_row, rows)| {
-        let mut flooder = AnyFlooder::new(&planes, &kernel);
-        for column in (0..width).step_by(BLOCK_SIDE) {
-            let block = flooder.flood_block(column as i64, (block_row * BLOCK_SIDE) as i64, BLOCK_SIDE);
-            for (row, fills) in rows.chunks_exact_mut(width).zip(&block) {
-                for (density, fill) in row[column..].iter_mut().zip(fills) {
-                    *density = config.hard_density(fill, bandwidth_cells);
-                }
-            }
+    let planes = BitPlanes::new(map, margin(&kernel));
+    let width = map.width();
+    let mut densities = vec![f32::NAN; width * map.height()];
+    densities.par_chunks_mut(width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
+        let fills = sweep(&planes, &kernel, (0, (task * ROWS_PER_TASK) as i64), (width, rows.len() / width));
+        for (density, fill) in rows.iter_mut().zip(&fills) {
+            *density = config.hard_density(fill, bandwidth_cells);
         }
     });
     densities
 }
 
+/// Rows of centres that a thread takes at a time.
+const ROWS_PER_TASK: usize = 16;
+
+/// Fills of a rectangle of centres, row by row.
+fn sweep(
+    planes: &BitPlanes,
+    kernel: &KernelRows,
+    corner: (i64, i64),
+    size: (usize, usize),
+) -> Vec<Option<Fill>> {
+    match 2 * kernel.radius() + 1 {
+        0..=64 => sweep_by::<1>(planes, kernel, corner, size),
+        65..=128 => sweep_by::<2>(planes, kernel, corner, size),
+        129..=256 => sweep_by::<4>(planes, kernel, corner, size),
+        _ => sweep_by::<8>(planes, kernel, corner, size),
+    }
+}
+
+fn sweep_by<const W: usize>(
+    planes: &BitPlanes,
+    kernel: &KernelRows,
+    (column, row): (i64, i64),
+    (width, height): (usize, usize),
+) -> Vec<Option<Fill>> {
+    let mut disc = DiscSweep::<W>::new(planes, kernel);
+    let mut fills = vec![None; width * height];
+    for (up, fills) in (0..).zip(fills.chunks_exact_mut(width)) {
+        disc.sweep(column, row + up, fills);
+    }
+    fills
+}
+
 impl DensityFieldConfig {
     /// The density of a fill when it is hard, else NaN.
     fn hard_density(&self, fill: &Option<Fill>, bandwidth_cells: f64) -> f32 {
-        let most_unknown = self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells;
+        let most_open = self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells;
         match fill {
-            Some(fill) if f64::from(fill.num_unknown) <= most_unknown => fill.density.min(1.0),
+            Some(fill) if f64::from(fill.num_open) <= most_open => fill.density.min(1.0),
             _ => f32::NAN,
         }
     }
@@ -317,9 +346,8 @@ fn densities_around(
     cell: (i64, i64),
 ) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
-    let planes = BitPlanes::new(map, kernel.radius() + MARGIN);
+    let planes = BitPlanes::new(map, margin(&kernel));
     let half = AROUND as i64 / 2;
-    let block = AnyFlooder::new(&planes, &kernel).flood_block(cell.0 - half, cell.1 - half, AROUND);
-    let density = |fill| config.hard_density(fill, bandwidth_cells);
-    block[..AROUND].iter().flat_map(|fills| fills[..AROUND].iter().map(density)).collect()
+    let fills = sweep(&planes, &kernel, (cell.0 - half, cell.1 - half), (AROUND, AROUND));
+    fills.iter().map(|fill| config.hard_density(fill, bandwidth_cells)).collect()
 }

@@ -43,7 +43,7 @@ impl KernelRows {
     /// The kernel of a bandwidth given in cells.
     pub fn new(profile: KernelProfile, bandwidth_cells: f64) -> Self {
         let radius = ((bandwidth_cells.ceil() as usize).max(1)) - 1;
-        let half_chords: Vec<Option<usize>> = (0..=radius + super::connected_disc::BLOCK_SIDE)
+        let half_chords: Vec<Option<usize>> = (0..=radius)
             .map(|dy| (0..=radius).rev().find(|&dx| (dx as f64).hypot(dy as f64) < bandwidth_cells))
             .collect();
         let height = |dx: i64, dy: i64| {
@@ -76,30 +76,36 @@ impl KernelRows {
         self.radius
     }
 
+    /// True when all cells weigh the same.
+    pub const fn is_uniform(&self) -> bool {
+        self.is_uniform
+    }
+
     /// Half the chord `dy` rows from the centre; None outside the disc.
     pub fn half_chord(&self, dy: usize) -> Option<usize> {
         self.half_chords.get(dy).copied().flatten()
     }
 
-    /// Kernel mass of the set cells of a disc's rows, whose leftmost column is `left`.
-    pub fn mass<const W: usize>(&self, rows: &[Row<W>], left: usize) -> f32 {
-        if self.is_uniform {
-            let num_cells: u32 = rows.iter().flatten().map(|word| word.count_ones()).sum();
-            return (f64::from(num_cells) * self.cell_mass) as f32;
-        }
-        rows.iter().zip(&self.running).map(|(row, running)| row_mass(row, left, running)).sum()
+    /// Kernel mass of that many cells when the kernel weighs all alike, else None.
+    pub fn mass_of_count(&self, num_cells: u32) -> Option<f32> {
+        self.is_uniform.then(|| (f64::from(num_cells) * self.cell_mass) as f32)
+    }
+
+    /// Kernel mass of the set cells of a disc's rows, whose first bit is the disc's leftmost column.
+    pub fn mass<const W: usize>(&self, rows: impl Iterator<Item = Row<W>>) -> f32 {
+        rows.zip(&self.running).map(|(row, running)| row_mass(&row, running)).sum()
     }
 }
 
 /// Sums the kernel over the runs of set bits of a row.
-fn row_mass<const W: usize>(row: &Row<W>, left: usize, running: &[f32]) -> f32 {
+fn row_mass<const W: usize>(row: &Row<W>, running: &[f32]) -> f32 {
     let mut mass = 0.0;
     for (word_idx, &word) in row.iter().enumerate() {
         let mut rest = word;
         while rest != 0 {
             let first = rest.trailing_zeros() as usize;
             let length = (!(rest >> first)).trailing_zeros() as usize;
-            let from = word_idx * 64 + first - left;
+            let from = word_idx * 64 + first;
             mass += running[from + length] - running[from];
             rest &= if first + length >= 64 { 0 } else { u64::MAX << (first + length) };
         }

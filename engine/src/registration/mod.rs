@@ -1,1 +1,24 @@
-//! Scan and submap registration: refined odometry and verification by geometry (SPEC section 4).
+//! Registration: where does this scan, or this neighbourhood, lie in that one (SPEC section 4)?
+//!
+//! [`OdometryRefiner`] matches scans against the recent dozen metres and hands out keyframes. Everything rests on
+//! two parts: a correlative search that finds the right valley, and point-to-line steps that find its bottom.
+
+mod branch_and_bound;
+mod config;
+mod correlative;
+mod evidence_grid;
+mod point_to_line;
+mod points;
+mod refiner;
+mod register;
+mod submap;
+mod surface_map;
+#[cfg(test)]
+pub(crate) mod testing;
+
+pub use branch_and_bound::SearchWindow;
+pub use config::{OdometryNoise, RefinerConfig, RegistrationConfig, SubmapConfig};
+pub(crate) use refiner::rotated;
+pub use refiner::{KeyframeMotion, OdometryRefiner, Refined};
+pub use register::{SubmapFit, refine_from, register};
+pub use submap::{Submap, SubmapScan};

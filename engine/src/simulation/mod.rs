@@ -9,7 +9,6 @@
 //! [`simulate_run`] is the conductor. All randomness comes from one seed: the same world, task, configuration and
 //! seed give the same bytes.
 
-mod clearance;
 mod config;
 mod drive;
 mod gaussian;

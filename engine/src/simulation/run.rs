@@ -128,10 +128,18 @@ impl Driver<'_> {
         // One way through all waypoints, so that the robot does not stop at each of them.
         let comfort_m = self.comfort_m(rng);
         let mut way: Vec<Point2> = Vec::new();
+        // Long routes drive the same legs again and again.
+        let mut planned: Vec<(&[Point2], Vec<Point2>)> = Vec::new();
         for pair in waypoints.windows(2) {
-            let ways = self.planner.ways_from(&pair[0], comfort_m)?;
-            let leg = self.planner.way_to(&ways, &pair[1])?;
-            way.extend(leg.into_iter().skip(usize::from(!way.is_empty())));
+            let known = planned.iter().find(|(ends, _)| *ends == pair);
+            let leg = match known {
+                Some((_, leg)) => leg.clone(),
+                None => self.planner.way_to(&self.planner.ways_from(&pair[0], comfort_m)?, &pair[1])?,
+            };
+            way.extend(leg.iter().skip(usize::from(!way.is_empty())));
+            if known.is_none() {
+                planned.push((pair, leg));
+            }
         }
         let mut poses = Vec::new();
         self.drive(&way, comfort_m, &mut poses);

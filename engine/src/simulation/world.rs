@@ -2,9 +2,8 @@
 
 use thiserror::Error;
 
-use super::clearance::distance_to_blocked;
 use crate::formats::{GrayImage, MapServerYaml};
-use crate::geometry::{Point2, Pose2};
+use crate::geometry::{Point2, Pose2, distance_to_blocked};
 
 /// A picture that cannot be a world.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]

@@ -2,7 +2,7 @@
 
 /// Distance in cells from the centre of each cell to the centre of the nearest one that is not free; what lies
 /// outside the grid is not free.
-pub(super) fn distance_to_blocked(width: usize, height: usize, is_free: &[bool]) -> Vec<f32> {
+pub fn distance_to_blocked(width: usize, height: usize, is_free: &[bool]) -> Vec<f32> {
     // One ring of blocked cells around the grid stands for everything outside.
     let (padded_width, padded_height) = (width + 2, height + 2);
     let far = ((padded_width * padded_width + padded_height * padded_height) * 4) as f64;

@@ -1,0 +1,185 @@
+//! Requests with patience: busy servers are asked again when they said to.
+
+use std::time::Duration;
+
+use reqwest::header::{ACCEPT, AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER};
+use reqwest::{Method, Response, StatusCode};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use tokio::time::{Instant, sleep};
+
+use crate::error::{ClientError, Problem};
+
+/// When to ask again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RetryPolicy {
+    /// No request is repeated after this long.
+    pub patience: Duration,
+    /// First pause where the server names none; doubled every time.
+    pub first_pause: Duration,
+    /// Longest pause where the server names none.
+    pub longest_pause: Duration,
+}
+
+impl Default for RetryPolicy {
+    fn default() -> Self {
+        Self {
+            patience: Duration::from_secs(60),
+            first_pause: Duration::from_millis(100),
+            longest_pause: Duration::from_secs(5),
+        }
+    }
+}
+
+/// A connection to one server. Cheap to clone; clones share their connections.
+#[derive(Clone, Debug)]
+pub struct Client {
+    http: reqwest::Client,
+    base_url: String,
+    api_key: Option<String>,
+    retry: RetryPolicy,
+}
+
+/// What a request carries.
+pub(crate) enum Body {
+    Empty,
+    Json(Vec<u8>),
+    Cbor(Vec<u8>),
+}
+
+impl Body {
+    pub(crate) fn json<T: Serialize>(value: &T) -> Result<Self, ClientError> {
+        serde_json::to_vec(value).map(Self::Json).map_err(|error| ClientError::Request(error.to_string()))
+    }
+
+    pub(crate) fn cbor<T: Serialize>(value: &T) -> Result<Self, ClientError> {
+        let mut bytes = Vec::new();
+        ciborium::into_writer(value, &mut bytes).map_err(|error| ClientError::Request(error.to_string()))?;
+        Ok(Self::Cbor(bytes))
+    }
+}
+
+impl Client {
+    /// A client of the server at `base_url`, such as `http://127.0.0.1:7878`.
+    ///
+    /// # Errors
+    /// The HTTP library cannot start.
+    pub fn new(base_url: &str) -> Result<Self, ClientError> {
+        let http = reqwest::Client::builder()
+            .connect_timeout(Duration::from_secs(10))
+            .build()
+            .map_err(ClientError::Transport)?;
+        let base_url = base_url.trim_end_matches('/').to_owned();
+        Ok(Self { http, base_url, api_key: None, retry: RetryPolicy::default() })
+    }
+
+    /// The same client with an API key.
+    #[must_use]
+    pub fn with_api_key(self, api_key: impl Into<String>) -> Self {
+        Self { api_key: Some(api_key.into()), ..self }
+    }
+
+    /// The same client with another patience.
+    #[must_use]
+    pub fn with_retry(self, retry: RetryPolicy) -> Self {
+        Self { retry, ..self }
+    }
+
+    /// Address of the server, without a slash at its end.
+    pub fn base_url(&self) -> &str {
+        &self.base_url
+    }
+
+    /// Sends a request and repeats it while the server is busy or does not answer. Every request of this API may
+    /// be repeated: batches are idempotent by their sequence number.
+    pub(crate) async fn send(
+        &self,
+        method: Method,
+        path: &str,
+        accept: &str,
+        body: Body,
+    ) -> Result<Response, ClientError> {
+        let deadline = Instant::now() + self.retry.patience;
+        let mut pause = self.retry.first_pause;
+        let (content_type, bytes) = match body {
+            Body::Empty => (None, Vec::new()),
+            Body::Json(bytes) => (Some("application/json"), bytes),
+            Body::Cbor(bytes) => (Some("application/cbor"), bytes),
+        };
+        // Shared, so that a repetition does not copy it.
+        let bytes = bytes::Bytes::from(bytes);
+        loop {
+            let mut request =
+                self.http.request(method.clone(), format!("{}{path}", self.base_url)).header(ACCEPT, accept);
+            if let Some(api_key) = &self.api_key {
+                request = request.header(AUTHORIZATION, format!("Bearer {api_key}"));
+            }
+            if let Some(content_type) = content_type {
+                request = request.header(CONTENT_TYPE, content_type).body(bytes.clone());
+            }
+            let (failure, wait) = match request.send().await {
+                Ok(response) if response.status().is_success() => return Ok(response),
+                Ok(response) => {
+                    let is_busy = matches!(
+                        response.status(),
+                        StatusCode::TOO_MANY_REQUESTS | StatusCode::SERVICE_UNAVAILABLE
+                    );
+                    let wait = retry_after(&response).unwrap_or(pause);
+                    let refusal = refusal(response).await;
+                    if !is_busy {
+                        return Err(refusal);
+                    }
+                    (refusal, wait)
+                }
+                Err(error) if error.is_builder() => return Err(ClientError::Request(error.to_string())),
+                Err(error) => (ClientError::Transport(error), pause),
+            };
+            if Instant::now() + wait > deadline {
+                return Err(failure);
+            }
+            sleep(wait).await;
+            pause = (2 * pause).min(self.retry.longest_pause);
+        }
+    }
+
+    pub(crate) async fn json<T: DeserializeOwned>(
+        &self,
+        method: Method,
+        path: &str,
+        body: Body,
+    ) -> Result<T, ClientError> {
+        let response = self.send(method, path, "application/json", body).await?;
+        let bytes = response.bytes().await.map_err(ClientError::Transport)?;
+        serde_json::from_slice(&bytes)
+            .map_err(|error| ClientError::Answer { path: path.to_owned(), problem: error.to_string() })
+    }
+
+    /// Any document of the API as it is, such as `/v1/sites/office/map/picture.png`.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn download(&self, path: &str, accept: &str) -> Result<Vec<u8>, ClientError> {
+        let response = self.send(Method::GET, path, accept, Body::Empty).await?;
+        Ok(response.bytes().await.map_err(ClientError::Transport)?.to_vec())
+    }
+
+    /// Whether the server is ready to work.
+    pub async fn is_ready(&self) -> bool {
+        let answer = self.http.get(format!("{}/readyz", self.base_url)).send().await;
+        answer.is_ok_and(|response| response.status().is_success())
+    }
+}
+
+fn retry_after(response: &Response) -> Option<Duration> {
+    let seconds = response.headers().get(RETRY_AFTER)?.to_str().ok()?.parse().ok()?;
+    Some(Duration::from_secs(seconds))
+}
+
+async fn refusal(response: Response) -> ClientError {
+    let status = response.status().as_u16();
+    let text = response.text().await.unwrap_or_default();
+    let mut problem = serde_json::from_str::<Problem>(&text)
+        .unwrap_or_else(|_| Problem { detail: text.chars().take(300).collect(), ..Problem::default() });
+    problem.status = status;
+    ClientError::Refused(Box::new(problem))
+}

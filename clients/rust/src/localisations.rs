@@ -1,0 +1,83 @@
+//! "Where am I": scans go in like a run's, hypotheses come out.
+
+use reqwest::Method;
+use serde::{Deserialize, Serialize};
+
+use crate::client::{Body, Client};
+use crate::error::ClientError;
+use crate::types::{NewRun, Pose, Scan};
+use crate::upload::{Encoding, batch_body};
+
+/// How sure the answer is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalisationState {
+    /// Nothing fits yet.
+    #[default]
+    Lost,
+    /// Several places fit.
+    Ambiguous,
+    /// One place fits.
+    Converged,
+}
+
+/// One place where the robot may be.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct Hypothesis {
+    /// Where in the map.
+    #[serde(alias = "map_from_robot")]
+    pub pose: Pose,
+    /// Covariance of (x, y, θ), row by row.
+    pub covariance: [[f64; 3]; 3],
+    /// Probability of this place.
+    pub probability: f64,
+}
+
+/// A localisation as it stands.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct Localisation {
+    /// Its name within the site.
+    #[serde(alias = "localisation")]
+    pub id: String,
+    /// How sure it is.
+    pub state: LocalisationState,
+    /// Places where the robot may be, likeliest first.
+    pub hypotheses: Vec<Hypothesis>,
+    /// Sequence number that the next scan must have.
+    pub next_sequence: u64,
+}
+
+impl Client {
+    /// Opens a localisation on the map of a site; nothing of it is added to the map.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn open_localisation(&self, site: &str, robot: &NewRun) -> Result<Localisation, ClientError> {
+        self.json(Method::POST, &format!("/v1/sites/{site}/localisations"), Body::json(robot)?).await
+    }
+
+    /// Adds scans and answers where the robot now may be.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn localise(
+        &self,
+        site: &str,
+        localisation: &str,
+        first_sequence: u64,
+        scans: &[Scan],
+    ) -> Result<Localisation, ClientError> {
+        let path = format!("/v1/sites/{site}/localisations/{localisation}/batches");
+        self.json(Method::POST, &path, batch_body(first_sequence, scans, Encoding::Cbor)?).await
+    }
+
+    /// Closes a localisation.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn close_localisation(&self, site: &str, localisation: &str) -> Result<(), ClientError> {
+        let path = format!("/v1/sites/{site}/localisations/{localisation}");
+        self.send(Method::DELETE, &path, "application/json", Body::Empty).await.map(drop)
+    }
+}

@@ -1,0 +1,173 @@
+//! The odometry motion model: a step is a turn, a drive and a turn, each with noise (Probabilistic Robotics,
+//! section 5.4).
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use serde::{Deserialize, Serialize};
+
+use super::noise::{LANES, Lanes, NoiseLanes};
+use super::particles::Particles;
+use super::turns::{sin_cos_turns, wrap_turns};
+use crate::config::ConfigError;
+use crate::geometry::{Pose2, wrap_angle};
+
+/// Noise of the odometry; variances per squared radian or squared metre of the step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OdometryMotionModel {
+    /// α₁: variance of a turn by turning.
+    pub alpha1: f64,
+    /// α₂: variance of a turn by driving, rad²/m².
+    pub alpha2: f64,
+    /// α₃: variance of the distance by driving.
+    pub alpha3: f64,
+    /// α₄: variance of the distance by turning, m²/rad².
+    pub alpha4: f64,
+}
+
+impl Default for OdometryMotionModel {
+    fn default() -> Self {
+        Self { alpha1: 0.02, alpha2: 0.005, alpha3: 0.02, alpha4: 0.005 }
+    }
+}
+
+/// A step as the model sees it, with standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Step {
+    first_turn: f32,
+    drive_m: f32,
+    second_turn: f32,
+    first_turn_sd: f32,
+    drive_sd_m: f32,
+    second_turn_sd: f32,
+}
+
+impl OdometryMotionModel {
+    /// Checks every value; `path` leads to this struct in the whole configuration.
+    ///
+    /// # Errors
+    /// The first field that is negative or not finite.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        let fields = [
+            ("alpha1", self.alpha1),
+            ("alpha2", self.alpha2),
+            ("alpha3", self.alpha3),
+            ("alpha4", self.alpha4),
+        ];
+        for (name, value) in fields {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(ConfigError::new(format!("{path}.{name}"), "must be finite and not negative"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves every particle by the odometry step `previous_from_robot`, with noise of its own.
+    pub(super) fn predict(
+        &self,
+        particles: &mut Particles,
+        previous_from_robot: &Pose2,
+        noise: &mut NoiseLanes,
+    ) {
+        let step = self.step(previous_from_robot);
+        let Particles { x_m, y_m, heading_turns, .. } = particles;
+        let (x_blocks, x_rest) = x_m.as_chunks_mut::<LANES>();
+        let (y_blocks, y_rest) = y_m.as_chunks_mut::<LANES>();
+        let (heading_blocks, heading_rest) = heading_turns.as_chunks_mut::<LANES>();
+        for ((x, y), heading) in x_blocks.iter_mut().zip(y_blocks).zip(heading_blocks) {
+            step.apply(x, y, heading, noise);
+        }
+        let count = x_rest.len();
+        let (mut x, mut y, mut heading) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        x[..count].copy_from_slice(x_rest);
+        y[..count].copy_from_slice(y_rest);
+        heading[..count].copy_from_slice(heading_rest);
+        step.apply(&mut x, &mut y, &mut heading, noise);
+        x_rest.copy_from_slice(&x[..count]);
+        y_rest.copy_from_slice(&y[..count]);
+        heading_rest.copy_from_slice(&heading[..count]);
+    }
+
+    /// Splits a step into turn, drive and turn; a robot that backs up turns little, not by half a circle.
+    fn step(&self, previous_from_robot: &Pose2) -> Step {
+        /// Below this the direction of the drive is noise.
+        const STANDING_M: f64 = 0.01;
+        let drive = previous_from_robot.x.hypot(previous_from_robot.y);
+        let bearing = previous_from_robot.y.atan2(previous_from_robot.x);
+        let (first, signed_drive) = match drive {
+            d if d < STANDING_M => (0.0, previous_from_robot.x),
+            _ if bearing.abs() > FRAC_PI_2 => (wrap_angle(bearing + PI), -drive),
+            _ => (bearing, drive),
+        };
+        let second = wrap_angle(previous_from_robot.theta - first);
+        let turn_sd = |turn: f64| (self.alpha1 * turn * turn + self.alpha2 * drive * drive).sqrt();
+        let turns_squared = first * first + second * second;
+        let turns = |angle: f64| (angle / TAU) as f32;
+        Step {
+            first_turn: turns(first),
+            drive_m: signed_drive as f32,
+            second_turn: turns(second),
+            first_turn_sd: turns(turn_sd(first)),
+            drive_sd_m: (self.alpha3 * drive * drive + self.alpha4 * turns_squared).sqrt() as f32,
+            second_turn_sd: turns(turn_sd(second)),
+        }
+    }
+}
+
+impl Step {
+    #[inline]
+    fn apply(&self, x: &mut Lanes, y: &mut Lanes, heading: &mut Lanes, noise: &mut NoiseLanes) {
+        let (first, drive, second) = (noise.normals(), noise.normals(), noise.normals());
+        for lane in 0..LANES {
+            let towards = wrap_turns(heading[lane] + self.first_turn + self.first_turn_sd * first[lane]);
+            let drive_m = self.drive_m + self.drive_sd_m * drive[lane];
+            let (sin, cos) = sin_cos_turns(towards);
+            x[lane] += drive_m * cos;
+            y[lane] += drive_m * sin;
+            heading[lane] = wrap_turns(towards + self.second_turn + self.second_turn_sd * second[lane]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::*;
+    use crate::geometry::Point2;
+
+    fn moved(model: &OdometryMotionModel, start: &Pose2, step: &Pose2, count: usize) -> Vec<Pose2> {
+        let origin = Point2::new(-20.0, 5.0);
+        let mut particles = Particles::default();
+        (0..count).for_each(|_| particles.push(start, &origin));
+        model.predict(&mut particles, step, &mut NoiseLanes::new(&mut ChaCha8Rng::seed_from_u64(1)));
+        (0..count).map(|index| particles.pose(index, &origin)).collect()
+    }
+
+    #[test]
+    fn without_noise_a_step_is_a_composition() {
+        let still = OdometryMotionModel { alpha1: 0.0, alpha2: 0.0, alpha3: 0.0, alpha4: 0.0 };
+        let start = Pose2::new(3.0, 9.0, 2.8);
+        for step in [Pose2::new(0.3, 0.1, 0.5), Pose2::new(-0.4, 0.05, -0.2), Pose2::new(0.0, 0.0, 1.0)] {
+            let expected = start.compose(&step);
+            for pose in moved(&still, &start, &step, 11) {
+                assert!(pose.distance(&expected) < 1e-4, "{pose:?} is not {expected:?}");
+                assert!(wrap_angle(pose.theta - expected.theta).abs() < 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn noise_has_the_stated_deviation() {
+        let model = OdometryMotionModel { alpha1: 0.0, alpha2: 0.0, alpha3: 0.04, alpha4: 0.0 };
+        let poses = moved(&model, &Pose2::identity(), &Pose2::new(1.0, 0.0, 0.0), 4001);
+        let mean = poses.iter().map(|pose| pose.x).sum::<f64>() / poses.len() as f64;
+        let variance = poses.iter().map(|pose| (pose.x - mean).powi(2)).sum::<f64>() / poses.len() as f64;
+        assert!(
+            (mean - 1.0).abs() < 0.02 && (variance.sqrt() - 0.2).abs() < 0.02,
+            "{mean} ± {}",
+            variance.sqrt()
+        );
+    }
+}

@@ -1,0 +1,173 @@
+//! The parts of the filter together, against plain references.
+
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::*;
+use crate::geometry::{Point2, Pose2, angle_between};
+
+/// Two rooms of different size on a corridor, 12 × 9 m.
+fn building() -> GridMap {
+    let mut map = GridMap::unknown(120, 90, 0.1, Point2::new(-4.0, 7.0));
+    let mut fill = |columns: std::ops::Range<i64>, rows: std::ops::Range<i64>, state| {
+        for (column, row) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
+            map.set(column, row, state);
+        }
+    };
+    fill(5..115, 5..85, CellState::Occupied);
+    fill(7..113, 7..27, CellState::Free);
+    fill(7..45, 30..80, CellState::Free);
+    fill(50..113, 30..60, CellState::Free);
+    fill(20..30, 27..30, CellState::Free);
+    fill(90..99, 27..30, CellState::Free);
+    map
+}
+
+fn served() -> ServedMap {
+    ServedMap::build(building(), &DensityFieldConfig::default(), &LikelihoodFieldConfig::default())
+}
+
+/// Eqs 3.3–3.6 as they are printed.
+fn weight_as_printed(
+    map: &ServedMap,
+    pose: &Pose2,
+    seen: &[KernelReading],
+    config: &DensityModelConfig,
+) -> f64 {
+    let (column, row) = map.grid.cell_at(&pose.position());
+    if map.grid.state(column, row) != CellState::Free {
+        return 0.0;
+    }
+    let mut weight = 1.0;
+    for (kernel, robot) in seen.iter().enumerate() {
+        let cell = map.density.reading(column, row, kernel).expect("the cell is free");
+        if let (Some(robot), Some(cell)) = (robot.density, cell.density) {
+            weight *= if f64::from((robot - cell).abs()) <= config.density_tolerance {
+                1.0
+            } else {
+                config.penalty
+            };
+        }
+        if let (Some(robot), Some(cell)) = (robot.descent_rad, cell.descent_rad) {
+            let difference = angle_between(-f64::from(robot), pose.theta - f64::from(cell));
+            weight *= if difference <= config.direction_tolerance_rad { 1.0 } else { config.penalty };
+        }
+    }
+    weight
+}
+
+#[test]
+fn byte_tests_weigh_as_the_equations_are_printed() {
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    for bandwidths_m in [vec![1.5, 3.0, 5.0], vec![3.0], vec![1.0, 2.0]] {
+        let fields = DensityFieldConfig { bandwidths_m, ..Default::default() };
+        let map = ServedMap::build(building(), &fields, &LikelihoodFieldConfig::default());
+        let config = DensityModelConfig::default();
+        let robot = Pose2::new(-1.0, 8.3, 0.4);
+        let seen = observe(&map.grid, &robot, &fields);
+        let mut particles = Particles::default();
+        for _ in 0..2000 {
+            let pose = Pose2::new(
+                rng.random_range(-4.5..8.5),
+                rng.random_range(6.5..16.5),
+                rng.random_range(-3.1..3.1),
+            );
+            particles.push(&pose, &map.grid.origin());
+        }
+        DensityModel::new(&map.density, &seen, &config).weigh(&mut particles);
+        let agreeing = (0..particles.len()).filter(|&index| {
+            let pose = particles.pose(index, &map.grid.origin());
+            let printed = weight_as_printed(&map, &pose, &seen, &config);
+            (f64::from(particles.weight(index)) - printed).abs() < 1e-6
+        });
+        // Directions are kept in steps of 2.8°, so particles on the brink of the tolerance may fall to either side.
+        let share = agreeing.count() as f64 / particles.len() as f64;
+        assert!(share > 0.97, "{share} of the weights agree");
+    }
+}
+
+#[test]
+fn the_robot_sees_what_the_map_holds() {
+    let map = served();
+    let config = DensityFieldConfig::default();
+    let pose = Pose2::new(-2.0, 8.9, 2.0);
+    let (column, row) = map.grid.cell_at(&pose.position());
+    for (kernel, seen) in observe(&map.grid, &pose, &config).iter().enumerate() {
+        let held = map.density.reading(column, row, kernel).expect("the cell is free");
+        let (seen_density, held_density) =
+            (seen.density.expect("all is known"), held.density.expect("all is known"));
+        assert!((seen_density - held_density).abs() < 0.003, "kernel {kernel}");
+        match (seen.descent_rad, held.descent_rad) {
+            (Some(seen), Some(held)) => {
+                assert!(
+                    angle_between(f64::from(seen) + pose.theta, f64::from(held)) < 0.03,
+                    "kernel {kernel}"
+                );
+            }
+            (seen, held) => assert_eq!(seen, held, "kernel {kernel}"),
+        }
+    }
+}
+
+#[test]
+fn fields_take_few_bytes_per_free_cell() {
+    let map = served();
+    let bytes_per_free_cell = map.density.num_bytes() as f64 / map.grid.num_free() as f64;
+    assert!(bytes_per_free_cell <= 24.0, "{bytes_per_free_cell}");
+}
+
+/// A drive along the corridor, through the door and round the larger room.
+fn drive() -> Vec<Pose2> {
+    let corners = [(-3.0, 8.7), (-1.5, 8.7), (-1.5, 11.0), (-0.3, 14.3), (-2.6, 14.3), (-2.6, 11.0)];
+    let mut poses = Vec::new();
+    for pair in corners.windows(2) {
+        let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
+        let (heading, length): (f64, f64) =
+            ((y1 - y0 as f64).atan2(x1 - x0 as f64), (x1 - x0 as f64).hypot(y1 - y0));
+        let num_steps = (length / 0.1) as usize;
+        poses.extend((0..num_steps).map(|step| {
+            let share = step as f64 / num_steps as f64;
+            Pose2::new(x0 + share * (x1 - x0), y0 + share * (y1 - y0), heading)
+        }));
+    }
+    poses
+}
+
+fn localise(seed: u64, map: &ServedMap) -> Vec<Hypothesis> {
+    let config = ParticleFilterConfig { num_particles: 8000, ..Default::default() };
+    let fields = DensityFieldConfig::default();
+    let mut filter = ParticleFilter::global(map, config, seed);
+    for pair in drive().windows(2) {
+        let seen = observe(&map.grid, &pair[1], &fields);
+        let sensor = DensityModel::new(&map.density, &seen, &DensityModelConfig::default());
+        filter.update(map, &pair[0].between(&pair[1]), &sensor);
+    }
+    filter.hypotheses(map)
+}
+
+#[test]
+fn densities_alone_find_the_robot_and_the_seed_repeats_it() {
+    let map = served();
+    let found = localise(4, &map);
+    let truth = drive()[drive().len() - 1];
+    assert!(found[0].map_from_robot.distance(&truth) < 0.5, "{:?} is not {truth:?}", found[0]);
+    assert!(
+        angle_between(found[0].map_from_robot.theta, truth.theta) < 0.3,
+        "{:?} is not {truth:?}",
+        found[0]
+    );
+    assert_eq!(localise(4, &map), found);
+}
+
+#[test]
+fn a_map_without_free_space_is_survived() {
+    let grid = GridMap::unknown(20, 20, 0.1, Point2::default());
+    let map = ServedMap::build(grid, &DensityFieldConfig::default(), &LikelihoodFieldConfig::default());
+    let mut filter = ParticleFilter::global(&map, ParticleFilterConfig::default(), 1);
+    filter.update(
+        &map,
+        &Pose2::new(0.1, 0.0, 0.0),
+        &LikelihoodFieldModel::new(&map.likelihood, &[Point2::default()]),
+    );
+    assert!(filter.hypotheses(&map).is_empty());
+}

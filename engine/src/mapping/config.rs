@@ -1,0 +1,130 @@
+//! Settings of the map builder.
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::ConfigError;
+use crate::pose_graph::PoseGraphConfig;
+use crate::registration::SubmapConfig;
+use crate::retrieval::RetrievalConfig;
+
+/// Everything that decides how runs become a map.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MappingConfig {
+    /// Profile candidates.
+    pub retrieval: RetrievalConfig,
+    /// Submap against submap.
+    pub submap: SubmapConfig,
+    /// Least squares.
+    pub pose_graph: PoseGraphConfig,
+    /// Travel between the anchors of submaps, metres.
+    pub anchor_spacing_m: f64,
+    /// Travel before and behind an anchor whose scans make its submap, metres.
+    pub submap_half_length_m: f64,
+    /// At most this many scans make a submap.
+    pub max_submap_scans: usize,
+    /// Standard deviation of the refined odometry's place per metre, metres.
+    pub drift_per_m: f64,
+    /// Standard deviation of its heading after one metre; grows with the square root of the distance, radians.
+    pub drift_turn_rad: f64,
+    /// Standard deviation of its heading after one radian of turning.
+    pub drift_turn_per_rad: f64,
+    /// Standard deviation that every registration has at least, metres.
+    pub fit_floor_m: f64,
+    /// … and radians.
+    pub fit_floor_rad: f64,
+    /// Share of opinions that must agree for submaps to fit.
+    pub min_agreement: f64,
+    /// Share of the returns about which the other submap must have an opinion.
+    pub min_overlap: f64,
+    /// Travel that must lie between two places of one run, metres.
+    pub min_gap_m: f64,
+    /// Drives that run this close beside each other in the map are matched, metres.
+    pub beside_m: f64,
+    /// Neighbours within this distance in the map are registered, metres.
+    pub neighbour_distance_m: f64,
+    /// Widest search around the predicted place, metres.
+    pub max_search_m: f64,
+    /// Widest search around the predicted heading, radians.
+    pub max_search_turn_rad: f64,
+    /// Rounds of guided matching at most.
+    pub max_rounds: usize,
+    /// A constraint is refused when its squared deviations exceed this.
+    pub max_chi2: f64,
+    /// Fits that must support a fit when the place was uncertain.
+    pub min_support: usize,
+    /// Anchors of one run that must fit another before the two share a map.
+    pub min_joining_anchors: usize,
+    /// Share of the tried anchors that must fit for that.
+    pub min_joining_share: f64,
+    /// Largest standard deviation of the place of one run in the other, metres.
+    pub max_joining_sd_m: f64,
+    /// The runner-up must have less than this share of the best hypothesis' support.
+    pub max_ambiguity: f64,
+}
+
+impl Default for MappingConfig {
+    fn default() -> Self {
+        Self {
+            retrieval: RetrievalConfig {
+                query_step_m: 2.0,
+                ..RetrievalConfig::default()
+            },
+            submap: SubmapConfig::default(),
+            pose_graph: PoseGraphConfig::default(),
+            anchor_spacing_m: 2.0,
+            submap_half_length_m: 4.0,
+            max_submap_scans: 50,
+            drift_per_m: 0.012,
+            drift_turn_rad: 0.004,
+            drift_turn_per_rad: 0.01,
+            fit_floor_m: 0.02,
+            fit_floor_rad: 0.003,
+            min_agreement: 0.8,
+            min_overlap: 0.25,
+            min_gap_m: 10.0,
+            beside_m: 1.1,
+            neighbour_distance_m: 5.0,
+            max_search_m: 5.0,
+            max_search_turn_rad: 0.4,
+            max_rounds: 8,
+            max_chi2: 16.0,
+            min_support: 2,
+            min_joining_anchors: 5,
+            min_joining_share: 0.7,
+            max_joining_sd_m: 0.2,
+            max_ambiguity: 0.7,
+        }
+    }
+}
+
+impl MappingConfig {
+    /// Checks every value; `path` is this struct's own path.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        self.retrieval.validate(&format!("{path}.retrieval"))?;
+        self.submap.validate(&format!("{path}.submap"))?;
+        self.pose_graph.validate(&format!("{path}.pose_graph"))?;
+        let positive = [
+            ("anchor_spacing_m", self.anchor_spacing_m),
+            ("submap_half_length_m", self.submap_half_length_m),
+            ("drift_per_m", self.drift_per_m),
+            ("drift_turn_rad", self.drift_turn_rad),
+            ("fit_floor_m", self.fit_floor_m),
+            ("fit_floor_rad", self.fit_floor_rad),
+            ("beside_m", self.beside_m),
+            ("neighbour_distance_m", self.neighbour_distance_m),
+            ("max_search_m", self.max_search_m),
+            ("max_search_turn_rad", self.max_search_turn_rad),
+            ("max_chi2", self.max_chi2),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
+            }
+        }
+        Ok(())
+    }
+}

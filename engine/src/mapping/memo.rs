@@ -1,0 +1,101 @@
+//! Remembers registrations, so that a rebuild only computes what is new.
+
+use std::collections::HashMap;
+
+use rayon::prelude::*;
+
+use super::anchors::AnchorSet;
+use crate::geometry::Pose2;
+use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
+
+/// A registration that is wanted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Request {
+    /// Anchor of the earlier submap.
+    pub earlier: usize,
+    /// Anchor of the later submap.
+    pub later: usize,
+    /// Where to search.
+    pub window: SearchWindow,
+}
+
+type Key = (u64, u64, [i32; 5]);
+
+/// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
+#[derive(Clone, Debug, Default)]
+pub struct RegistrationMemo {
+    fits: HashMap<Key, Option<SubmapFit>>,
+    config: Option<SubmapConfig>,
+}
+
+impl RegistrationMemo {
+    /// Number of remembered registrations.
+    pub fn len(&self) -> usize {
+        self.fits.len()
+    }
+
+    /// True when nothing is remembered.
+    pub fn is_empty(&self) -> bool {
+        self.fits.is_empty()
+    }
+
+    /// Forgets everything when the settings are others than before.
+    pub(crate) fn prepare(&mut self, config: &SubmapConfig) {
+        if self.config.as_ref() != Some(config) {
+            self.fits.clear();
+            self.config = Some(config.clone());
+        }
+    }
+
+    /// Answers in the order of the requests; what is not remembered is computed in parallel.
+    ///
+    /// Windows are rounded first, so that a map that moved a little asks the same question again.
+    pub(crate) fn answers(
+        &mut self,
+        requests: &[Request],
+        set: &AnchorSet,
+        config: &SubmapConfig,
+    ) -> Vec<Option<SubmapFit>> {
+        let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, set)).collect();
+        let mut missing: Vec<(Key, Request)> =
+            keyed.iter().filter(|(key, _)| !self.fits.contains_key(key)).copied().collect();
+        missing.sort_by_key(|(key, _)| *key);
+        missing.dedup_by_key(|(key, _)| *key);
+        let computed: Vec<(Key, Option<SubmapFit>)> = missing
+            .par_iter()
+            .map(|(key, request)| {
+                let (earlier, later) = (&set.submaps[request.earlier], &set.submaps[request.later]);
+                (*key, register(earlier, later, &request.window, config))
+            })
+            .collect();
+        self.fits.extend(computed);
+        keyed.iter().map(|(key, _)| self.fits.get(key).copied().flatten()).collect()
+    }
+}
+
+/// Grain of the rounded windows: metres and radians.
+const GRAIN_M: f64 = 0.25;
+const GRAIN_RAD: f64 = 0.05;
+
+fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
+    let window = &request.window;
+    let grains = [
+        (window.centre.x / GRAIN_M).round() as i32,
+        (window.centre.y / GRAIN_M).round() as i32,
+        (window.centre.theta / GRAIN_RAD).round() as i32,
+        (window.half_m / GRAIN_M).ceil() as i32,
+        (window.half_turn_rad / GRAIN_RAD).ceil() as i32,
+    ];
+    let centre = Pose2::new(
+        f64::from(grains[0]) * GRAIN_M,
+        f64::from(grains[1]) * GRAIN_M,
+        f64::from(grains[2]) * GRAIN_RAD,
+    );
+    let window = SearchWindow {
+        centre,
+        half_m: f64::from(grains[3]) * GRAIN_M,
+        half_turn_rad: f64::from(grains[4]) * GRAIN_RAD,
+    };
+    let key = (set.anchors[request.earlier].fingerprint, set.anchors[request.later].fingerprint, grains);
+    (key, Request { window, ..*request })
+}

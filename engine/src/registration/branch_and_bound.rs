@@ -1,0 +1,190 @@
+//! Correlative search by branch and bound: the best pose of a window, found without trying most of them.
+//!
+//! A pyramid holds for every cell the best worth within the next 1, 2, 4, 8 cells to the right and up, so that one
+//! look bounds a whole block of offsets from above (Hess et al. 2016, after Olson 2009).
+
+use super::evidence_grid::EvidenceGrid;
+use crate::geometry::{Point2, Pose2};
+
+/// The poses to try around a start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SearchWindow {
+    /// Pose in the middle of the window.
+    pub centre: Pose2,
+    /// Half width in x and y, metres.
+    pub half_m: f64,
+    /// Half width of the heading, radians.
+    pub half_turn_rad: f64,
+}
+
+/// Block sizes of the pyramid, cells.
+const NUM_LEVELS: usize = 4;
+
+/// Bounds for blocks of offsets.
+#[derive(Clone, Debug)]
+pub(crate) struct SearchPyramid {
+    cell_m: f64,
+    half: i32,
+    side: i32,
+    levels: Vec<Vec<u8>>,
+}
+
+/// A block of offsets at one heading.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    bound: u32,
+    turn_idx: usize,
+    x: i32,
+    y: i32,
+}
+
+impl SearchPyramid {
+    /// The pyramid over the hits of a grid, with cells twice as large: the alignment that follows finds the rest.
+    pub fn new(grid: &EvidenceGrid) -> Self {
+        let half = grid.half().div_euclid(2) + 1;
+        let side = 2 * half + 1;
+        let mut levels = vec![halved(grid, half)];
+        for level in 1..NUM_LEVELS {
+            let reach = 1usize << (level - 1);
+            levels.push(widened(&levels[level - 1], side as usize, reach));
+        }
+        Self { cell_m: 2.0 * grid.cell_m(), half, side, levels }
+    }
+
+    /// The pose of highest worth, and that worth as a share of the highest possible; none when nothing falls onto a
+    /// surface. Ties go to the first in a fixed order.
+    pub fn best_pose(
+        &self,
+        points: &[Point2],
+        window: &SearchWindow,
+        turn_step_rad: f64,
+    ) -> Option<(Pose2, f64)> {
+        if points.is_empty() {
+            return None;
+        }
+        let num_turns = (window.half_turn_rad / turn_step_rad).ceil() as i32;
+        let half_cells = (window.half_m / self.cell_m).ceil() as i32;
+        let top = NUM_LEVELS - 1;
+        let block = 1 << top;
+        let headings: Vec<f64> =
+            (-num_turns..=num_turns).map(|k| window.centre.theta + f64::from(k) * turn_step_rad).collect();
+        let placed: Vec<Vec<(i32, i32)>> =
+            headings.iter().map(|&theta| self.cells_at(points, &window.centre, theta)).collect();
+        let mut blocks = Vec::new();
+        for (turn_idx, cells) in placed.iter().enumerate() {
+            for y in (-half_cells..=half_cells).step_by(block) {
+                for x in (-half_cells..=half_cells).step_by(block) {
+                    blocks.push(Block { bound: self.bound(top, cells, x, y), turn_idx, x, y });
+                }
+            }
+        }
+        blocks.sort_by_key(|block| (std::cmp::Reverse(block.bound), block.turn_idx, block.y, block.x));
+        let mut best: Option<Block> = None;
+        for block in &blocks {
+            if block.bound <= best.map_or(0, |best| best.bound) {
+                break;
+            }
+            self.descend(top, block, &placed[block.turn_idx], half_cells, &mut best);
+        }
+        best.map(|best| {
+            let pose = Pose2::new(
+                window.centre.x + f64::from(best.x) * self.cell_m,
+                window.centre.y + f64::from(best.y) * self.cell_m,
+                headings[best.turn_idx],
+            );
+            (pose, f64::from(best.bound) / (2.0 * points.len() as f64))
+        })
+    }
+
+    fn descend(
+        &self,
+        level: usize,
+        block: &Block,
+        cells: &[(i32, i32)],
+        half_cells: i32,
+        best: &mut Option<Block>,
+    ) {
+        if level == 0 {
+            if block.bound > best.map_or(0, |best| best.bound) {
+                *best = Some(*block);
+            }
+            return;
+        }
+        let step = 1 << (level - 1);
+        let mut children: Vec<Block> = Vec::with_capacity(4);
+        for (dx, dy) in [(0, 0), (step, 0), (0, step), (step, step)] {
+            let (x, y) = (block.x + dx, block.y + dy);
+            if x <= half_cells && y <= half_cells {
+                children.push(Block { bound: self.bound(level - 1, cells, x, y), x, y, ..*block });
+            }
+        }
+        children.sort_by_key(|child| std::cmp::Reverse(child.bound));
+        for child in &children {
+            if child.bound <= best.map_or(0, |best| best.bound) {
+                break;
+            }
+            self.descend(level - 1, child, cells, half_cells, best);
+        }
+    }
+
+    fn cells_at(&self, points: &[Point2], centre: &Pose2, theta: f64) -> Vec<(i32, i32)> {
+        let (sin, cos) = theta.sin_cos();
+        points
+            .iter()
+            .map(|point| {
+                let x = centre.x + cos * point.x - sin * point.y;
+                let y = centre.y + sin * point.x + cos * point.y;
+                (
+                    (x / self.cell_m + 0.5).floor() as i32 + self.half,
+                    (y / self.cell_m + 0.5).floor() as i32 + self.half,
+                )
+            })
+            .collect()
+    }
+
+    /// Upper bound of the worth over the block of `2^level` offsets from (x, y) on.
+    fn bound(&self, level: usize, cells: &[(i32, i32)], x: i32, y: i32) -> u32 {
+        let values = &self.levels[level];
+        let reach = (1 << level) - 1;
+        let mut sum = 0;
+        for &(column, row) in cells {
+            let (column, row) = (column + x, row + y);
+            // A block may begin outside the grid and still reach into it; the border cells are always empty.
+            if column >= -reach && row >= -reach && column < self.side && row < self.side {
+                let index = row.max(0) * self.side + column.max(0);
+                sum += u32::from(values[index as usize]);
+            }
+        }
+        sum
+    }
+}
+
+/// The best worth of the fine cells whose centres lie in or on the border of each coarse cell.
+fn halved(grid: &EvidenceGrid, half: i32) -> Vec<u8> {
+    let (fine_half, fine_side) = (grid.half(), 2 * grid.half() + 1);
+    let side = 2 * half + 1;
+    let mut coarse = vec![0u8; (side * side) as usize];
+    for (index, &worth) in grid.hit_worth().iter().enumerate().filter(|(_, worth)| **worth > 0) {
+        let (x, y) = (index as i32 % fine_side - fine_half, index as i32 / fine_side - fine_half);
+        let cell = &mut coarse[((y.div_euclid(2) + half) * side + x.div_euclid(2) + half) as usize];
+        *cell = (*cell).max(worth);
+    }
+    coarse
+}
+
+/// The maximum over each cell and the one `reach` to the right, then the same upwards.
+fn widened(values: &[u8], side: usize, reach: usize) -> Vec<u8> {
+    let mut wide = values.to_vec();
+    for row in 0..side {
+        let line = &values[row * side..(row + 1) * side];
+        let target = &mut wide[row * side..(row + 1) * side];
+        for (cell, &right) in target.iter_mut().zip(&line[reach.min(side)..]) {
+            *cell = (*cell).max(right);
+        }
+    }
+    let across = wide.clone();
+    for (cell, &above) in wide.iter_mut().zip(&across[(reach * side).min(across.len())..]) {
+        *cell = (*cell).max(above);
+    }
+    wide
+}

@@ -1,0 +1,263 @@
+//! Settings of the registration room.
+
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+use crate::config::ConfigError;
+use crate::geometry::Pose2;
+
+/// Everything about registering scans and submaps.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RegistrationConfig {
+    /// Scan against recent scans.
+    pub refiner: RefinerConfig,
+    /// Submap against submap.
+    pub submap: SubmapConfig,
+}
+
+/// Settings of [`Submap`](super::Submap) and [`register`](super::register).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SubmapConfig {
+    /// Free space and search reach this far from the anchor, metres.
+    pub radius_m: f64,
+    /// Returns farther than this from the robot are not used, metres.
+    pub range_limit_m: f64,
+    /// Returns of a sweep are thinned to this distance, metres.
+    pub point_spacing_m: f64,
+    /// At most this many returns of a scan are used.
+    pub max_points: usize,
+    /// Edge of a surface cell, metres.
+    pub cell_m: f64,
+    /// Edge of a cell of free space and of the search, metres.
+    pub evidence_cell_m: f64,
+    /// Distance between the points that are aligned, metres.
+    pub fine_spacing_m: f64,
+    /// Distance between the points that are searched with, metres.
+    pub coarse_spacing_m: f64,
+    /// Step of the heading in the search, radians.
+    pub turn_step_rad: f64,
+    /// Expected distance of a return from its surface, metres.
+    pub noise_m: f64,
+    /// Beyond about this distance a return is an outlier, metres.
+    pub outlier_m: f64,
+    /// The same at the first step of the alignment, metres.
+    pub first_outlier_m: f64,
+    /// Points that a surface must rest on.
+    pub min_count: i32,
+    /// Gauss-Newton steps at most.
+    pub max_iterations: usize,
+    /// This many returns count as one independent measurement.
+    pub correlated_returns: f64,
+}
+
+impl Default for SubmapConfig {
+    fn default() -> Self {
+        Self {
+            radius_m: 12.0,
+            range_limit_m: 25.0,
+            point_spacing_m: 0.08,
+            max_points: 180,
+            cell_m: 0.2,
+            evidence_cell_m: 0.1,
+            fine_spacing_m: 0.1,
+            coarse_spacing_m: 0.4,
+            turn_step_rad: 0.02,
+            noise_m: 0.03,
+            outlier_m: 0.15,
+            first_outlier_m: 0.3,
+            min_count: 4,
+            max_iterations: 10,
+            correlated_returns: 10.0,
+        }
+    }
+}
+
+/// How far wheel odometry is trusted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct OdometryNoise {
+    /// Standard deviation of the distance per metre driven.
+    pub distance_per_m: f64,
+    /// Standard deviation of the distance that is always there, metres.
+    pub distance_floor_m: f64,
+    /// Standard deviation of the heading per radian turned.
+    pub turn_per_rad: f64,
+    /// Standard deviation of the heading per metre driven, radians.
+    pub turn_per_m_rad: f64,
+    /// Standard deviation of the heading that is always there, radians.
+    pub turn_floor_rad: f64,
+}
+
+impl Default for OdometryNoise {
+    fn default() -> Self {
+        Self {
+            distance_per_m: 0.1,
+            distance_floor_m: 0.01,
+            turn_per_rad: 0.3,
+            turn_per_m_rad: 0.1,
+            turn_floor_rad: 0.005,
+        }
+    }
+}
+
+impl OdometryNoise {
+    /// Covariance of a motion's (x, y, θ) in the axes of its start.
+    pub fn covariance(&self, motion: &Pose2) -> Matrix3<f64> {
+        let distance_m = motion.x.hypot(motion.y);
+        let distance_sd = self.distance_floor_m + self.distance_per_m * distance_m;
+        let turn_sd =
+            self.turn_floor_rad + self.turn_per_rad * motion.theta.abs() + self.turn_per_m_rad * distance_m;
+        Matrix3::from_diagonal(&nalgebra::Vector3::new(
+            distance_sd * distance_sd,
+            distance_sd * distance_sd,
+            turn_sd * turn_sd,
+        ))
+    }
+}
+
+/// Settings of [`OdometryRefiner`](super::OdometryRefiner).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RefinerConfig {
+    /// A scan is registered after this much travel, metres.
+    pub keyframe_distance_m: f64,
+    /// … or after this much turning, radians.
+    pub keyframe_turn_rad: f64,
+    /// Scans of this much travel are the map to match against, metres.
+    pub window_m: f64,
+    /// At most this many scans are kept, however little the robot moved.
+    pub max_scans: usize,
+    /// Returns farther than this are not used, metres.
+    pub range_limit_m: f64,
+    /// Returns of a sweep are thinned to this distance, metres.
+    pub point_spacing_m: f64,
+    /// At most this many returns of a scan are used.
+    pub max_points: usize,
+    /// Fewer returns than this are not registered.
+    pub min_points: usize,
+    /// Edge of a surface cell, metres.
+    pub cell_m: f64,
+    /// Expected distance of a return from its surface, metres.
+    pub noise_m: f64,
+    /// Beyond about this distance a return is an outlier, metres.
+    pub outlier_m: f64,
+    /// The same at the first step of the alignment, metres.
+    pub first_outlier_m: f64,
+    /// Gauss-Newton steps at most.
+    pub max_iterations: usize,
+    /// This many returns count as one independent measurement.
+    pub correlated_returns: f64,
+    /// A fit with this share of returns on surfaces needs no search.
+    pub good_inlier_share: f64,
+    /// A fit with a smaller share is not believed: odometry stands.
+    pub min_inlier_share: f64,
+    /// The search must raise the share of returns on surfaces by this much to be believed.
+    pub min_search_gain: f64,
+    /// Half width of the correlative search, metres.
+    pub search_half_m: f64,
+    /// Half width of the correlative search, radians.
+    pub search_half_turn_rad: f64,
+    /// Cell of the correlative search, metres.
+    pub search_cell_m: f64,
+    /// Returns within this distance take part in the correlative search, metres.
+    pub search_radius_m: f64,
+    /// Prior of the motion.
+    pub odometry: OdometryNoise,
+}
+
+impl Default for RefinerConfig {
+    fn default() -> Self {
+        Self {
+            keyframe_distance_m: 0.2,
+            keyframe_turn_rad: 0.175,
+            window_m: 12.0,
+            max_scans: 90,
+            range_limit_m: 40.0,
+            point_spacing_m: 0.05,
+            max_points: 180,
+            min_points: 20,
+            cell_m: 0.2,
+            noise_m: 0.02,
+            outlier_m: 0.15,
+            first_outlier_m: 0.3,
+            max_iterations: 10,
+            correlated_returns: 3.0,
+            good_inlier_share: 0.7,
+            min_inlier_share: 0.3,
+            min_search_gain: 0.1,
+            search_half_m: 0.4,
+            search_half_turn_rad: 0.2,
+            search_cell_m: 0.1,
+            search_radius_m: 20.0,
+            odometry: OdometryNoise::default(),
+        }
+    }
+}
+
+impl RegistrationConfig {
+    /// Checks every value; `path` is this struct's own path.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        self.refiner.validate(&format!("{path}.refiner"))?;
+        self.submap.validate(&format!("{path}.submap"))
+    }
+}
+
+impl SubmapConfig {
+    /// Checks every value; `path` is this struct's own path.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        let positive = [
+            ("radius_m", self.radius_m),
+            ("range_limit_m", self.range_limit_m),
+            ("cell_m", self.cell_m),
+            ("evidence_cell_m", self.evidence_cell_m),
+            ("fine_spacing_m", self.fine_spacing_m),
+            ("coarse_spacing_m", self.coarse_spacing_m),
+            ("turn_step_rad", self.turn_step_rad),
+            ("noise_m", self.noise_m),
+            ("outlier_m", self.outlier_m),
+            ("first_outlier_m", self.first_outlier_m),
+            ("correlated_returns", self.correlated_returns),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl RefinerConfig {
+    /// Checks every value; `path` is this struct's own path.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        let positive = [
+            ("keyframe_distance_m", self.keyframe_distance_m),
+            ("keyframe_turn_rad", self.keyframe_turn_rad),
+            ("window_m", self.window_m),
+            ("range_limit_m", self.range_limit_m),
+            ("cell_m", self.cell_m),
+            ("noise_m", self.noise_m),
+            ("outlier_m", self.outlier_m),
+            ("correlated_returns", self.correlated_returns),
+            ("search_cell_m", self.search_cell_m),
+            ("search_radius_m", self.search_radius_m),
+        ];
+        for (field, value) in positive {
+            if !(value.is_finite() && value > 0.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
+            }
+        }
+        Ok(())
+    }
+}

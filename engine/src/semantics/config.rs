@@ -1,0 +1,150 @@
+//! What labelling can be told.
+
+use std::f64::consts::PI;
+
+use serde::{Deserialize, Serialize};
+
+use crate::config::ConfigError;
+
+/// How places are labelled from the map.
+///
+/// The lengths of forks and bends and the two angles of corners were chosen on `aces`, `intel` and `mit-killian`; what
+/// they are worth on a building that had no say in them is told in `docs/labels.md`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SemanticsConfig {
+    /// Edge of a cell, metres.
+    pub resolution_m: f64,
+    /// Edge of the core of a block, metres: only a matter of memory.
+    pub block_m: f64,
+    /// Beams are followed this far, metres.
+    pub sight_m: f64,
+    /// Travel between two positions whose surroundings are looked at, metres.
+    pub spacing_m: f64,
+    /// A cell is occupied when more than this share of the scans that saw it hit it.
+    pub occupied_share: f64,
+    /// Obstacles of at most this many cells are passed over.
+    pub speck_cells: usize,
+    /// Half the width of the strip along a driven path that counts as free, metres.
+    pub driven_radius_m: f64,
+    /// The clearance of a position is the largest within this distance, metres.
+    pub half_width_reach_m: f64,
+    /// Half the width of the narrowest opening that can be a passage, metres.
+    pub door_half_width_m: f64,
+    /// Passages of a fork are counted from this distance, metres,
+    pub fork_near_m: f64,
+    /// plus this many times the half width of the corridor,
+    pub fork_near_per_half_width: f64,
+    /// but not farther, metres;
+    pub fork_near_max_m: f64,
+    /// and must go on for this long, metres.
+    pub fork_length_m: f64,
+    /// Half the width of the narrowest part of a passage whose shape is judged, metres.
+    pub bend_half_width_m: f64,
+    /// The shape of a passage is judged from this distance, metres,
+    pub bend_near_m: f64,
+    /// and on for this long, metres.
+    pub bend_length_m: f64,
+    /// A straighter passage is no corner (see [`super::PlaceSignature::straightness`]).
+    pub corner_straightness: f64,
+    /// The way driven through a corner turns by at least this, radians,
+    pub corner_turn_rad: f64,
+    /// from so much travel before to so much travel after, metres.
+    pub turn_reach_m: f64,
+    /// A place with a straighter passage is no dead end.
+    pub dead_end_straightness: f64,
+    /// Driven ways are counted from this distance, metres,
+    pub driven_near_m: f64,
+    /// and must go on for this long, metres.
+    pub driven_length_m: f64,
+    /// Radius of the smallest hall, metres.
+    pub hall_radius_m: f64,
+    /// The part of a hall's radius that is hall; the rim belongs to what joins it.
+    pub hall_core_share: f64,
+    /// Labels are the majority over this much travel before and after, metres.
+    pub smoothing_m: f64,
+}
+
+impl Default for SemanticsConfig {
+    fn default() -> Self {
+        Self {
+            resolution_m: 0.1,
+            block_m: 64.0,
+            sight_m: 12.0,
+            spacing_m: 0.4,
+            occupied_share: 0.2,
+            speck_cells: 8,
+            driven_radius_m: 0.3,
+            half_width_reach_m: 1.0,
+            door_half_width_m: 0.5,
+            fork_near_m: 1.5,
+            fork_near_per_half_width: 2.0,
+            fork_near_max_m: 5.5,
+            fork_length_m: 4.5,
+            bend_half_width_m: 0.7,
+            bend_near_m: 4.0,
+            bend_length_m: 1.5,
+            corner_straightness: 0.84,
+            corner_turn_rad: 25.0 / 180.0 * PI,
+            turn_reach_m: 2.0,
+            dead_end_straightness: 0.8,
+            driven_near_m: 1.5,
+            driven_length_m: 5.0,
+            hall_radius_m: 3.0,
+            hall_core_share: 0.8,
+            smoothing_m: 0.8,
+        }
+    }
+}
+
+impl SemanticsConfig {
+    /// Distance from a position within which anything can matter to its label, metres.
+    pub(super) fn margin_m(&self) -> f64 {
+        let flood_m = (self.fork_near_max_m + self.fork_length_m)
+            .max(self.bend_near_m + self.bend_length_m)
+            .max(self.driven_near_m + self.driven_length_m);
+        flood_m + 2.0 * self.hall_radius_m
+    }
+
+    /// Checks every value; `path` is the name of this part in the whole configuration.
+    ///
+    /// # Errors
+    /// The first field that cannot work.
+    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        for (field, value, lowest, highest) in [
+            ("resolution_m", self.resolution_m, 0.02, 0.5),
+            ("block_m", self.block_m, 8.0, 256.0),
+            ("sight_m", self.sight_m, 1.0, 60.0),
+            ("spacing_m", self.spacing_m, 0.05, 5.0),
+            ("occupied_share", self.occupied_share, 0.0, 1.0),
+            ("speck_cells", self.speck_cells as f64, 0.0, 1000.0),
+            ("driven_radius_m", self.driven_radius_m, self.resolution_m, 2.0),
+            ("half_width_reach_m", self.half_width_reach_m, 0.0, 5.0),
+            ("door_half_width_m", self.door_half_width_m, 0.0, 3.0),
+            ("fork_near_m", self.fork_near_m, 0.1, 10.0),
+            ("fork_near_per_half_width", self.fork_near_per_half_width, 0.0, 10.0),
+            ("fork_near_max_m", self.fork_near_max_m, 0.1, 20.0),
+            ("fork_length_m", self.fork_length_m, 0.1, 20.0),
+            ("bend_half_width_m", self.bend_half_width_m, 0.0, 3.0),
+            ("bend_near_m", self.bend_near_m, 0.1, 20.0),
+            ("bend_length_m", self.bend_length_m, 0.1, 20.0),
+            ("corner_straightness", self.corner_straightness, 0.0, 1.0),
+            ("corner_turn_rad", self.corner_turn_rad, 0.0, PI),
+            ("turn_reach_m", self.turn_reach_m, 0.1, 20.0),
+            ("dead_end_straightness", self.dead_end_straightness, 0.0, 1.0),
+            ("driven_near_m", self.driven_near_m, 0.1, 20.0),
+            ("driven_length_m", self.driven_length_m, 0.1, 20.0),
+            ("hall_radius_m", self.hall_radius_m, 0.5, 10.0),
+            ("hall_core_share", self.hall_core_share, 0.0, 1.0),
+            ("smoothing_m", self.smoothing_m, 0.0, 10.0),
+        ] {
+            if !(lowest..=highest).contains(&value) {
+                return Err(ConfigError::new(
+                    format!("{path}.{field}"),
+                    format!("must lie in {lowest}..={highest}"),
+                ));
+            }
+        }
+        Ok(())
+    }
+}

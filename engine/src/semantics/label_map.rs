@@ -1,0 +1,223 @@
+//! The conductor: all driving in one map → the surroundings of its places → a label for every observation.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::block::{Block, BlockEvidence};
+use super::config::SemanticsConfig;
+use super::label::PlaceLabel;
+use super::rules::label_of;
+use super::signature::{PlaceSignature, SignatureReader};
+use crate::geometry::{Point2, Pose2, angle_between};
+use crate::mapping::{Keyframe, RunRecord};
+use crate::scan::ScanGeometry;
+
+/// One run, at its poses in the map.
+#[derive(Clone, Debug)]
+pub struct DrivenRun<'a> {
+    /// The laser.
+    pub geometry: &'a ScanGeometry,
+    /// Scans and where they were taken.
+    pub scans: Vec<(Pose2, &'a [f32])>,
+    /// Where the observations were made, in order of travel.
+    pub map_from_observations: Vec<Pose2>,
+}
+
+impl<'a> DrivenRun<'a> {
+    /// A run as the map builder placed it: scans at their keyframes' poses, observations carried along from the
+    /// last keyframe before each.
+    pub fn in_map(record: &RunRecord<'a>, map_from_keyframes: &[Pose2]) -> Self {
+        let placed: Vec<(&'a Keyframe, Pose2)> =
+            record.keyframes.iter().zip(map_from_keyframes.iter().copied()).collect();
+        let map_from_observations = record
+            .observations
+            .iter()
+            .map(|observation| {
+                let next = placed.partition_point(|(keyframe, _)| keyframe.scan_seq <= observation.scan_seq);
+                match placed.get(next.saturating_sub(1)) {
+                    Some((keyframe, map_from_keyframe)) => map_from_keyframe
+                        .compose(&keyframe.run_from_robot.between(&observation.run_from_robot)),
+                    None => observation.run_from_robot,
+                }
+            })
+            .collect();
+        let scans = placed.iter().map(|(keyframe, pose)| (*pose, keyframe.ranges_m.as_slice())).collect();
+        Self { geometry: record.geometry, scans, map_from_observations }
+    }
+}
+
+/// Labels of the observations of one run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LabelledRun {
+    /// A label for each observation.
+    pub labels: Vec<PlaceLabel>,
+    /// The share of what was seen nearby that agrees with the label, in [0, 1].
+    pub confidences: Vec<f32>,
+    /// The surroundings looked at, with the observation that they belong to.
+    pub signatures: Vec<(usize, PlaceSignature)>,
+}
+
+/// A position whose surroundings are looked at.
+#[derive(Clone, Copy)]
+struct Sample {
+    run_idx: usize,
+    observation_idx: usize,
+    position: Point2,
+    turn_rad: f64,
+}
+
+/// Labels every observation of runs that share one map frame.
+///
+/// The label belongs to the place: it is decided by what all runs saw around it and by where any of them drove.
+pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<LabelledRun> {
+    let samples: Vec<Sample> =
+        runs.iter().enumerate().flat_map(|(run_idx, run)| samples_of(config, run_idx, run)).collect();
+    let mut blocks: BTreeMap<(i64, i64), Vec<Sample>> = BTreeMap::new();
+    for sample in samples {
+        let key = |metres: f64| (metres / config.block_m).floor() as i64;
+        blocks.entry((key(sample.position.x), key(sample.position.y))).or_default().push(sample);
+    }
+    let blocks: Vec<Vec<Sample>> = blocks.into_values().collect();
+    let read: Vec<Vec<PlaceSignature>> =
+        blocks.par_iter().map(|samples| read_block(config, runs, samples)).collect();
+    let mut signatures: Vec<Vec<(usize, PlaceSignature)>> = vec![Vec::new(); runs.len()];
+    for (sample, signature) in blocks.iter().flatten().zip(read.into_iter().flatten()) {
+        signatures[sample.run_idx].push((sample.observation_idx, signature));
+    }
+    runs.iter()
+        .zip(signatures)
+        .map(|(run, mut signatures)| {
+            signatures.sort_by_key(|(observation_idx, _)| *observation_idx);
+            label_run(config, run, signatures)
+        })
+        .collect()
+}
+
+/// Positions of a run a little travel apart; the first is always one of them.
+fn samples_of(config: &SemanticsConfig, run_idx: usize, run: &DrivenRun<'_>) -> Vec<Sample> {
+    let poses = &run.map_from_observations;
+    let mut travel_m = vec![0.0];
+    for pair in poses.windows(2) {
+        travel_m.push(travel_m[travel_m.len() - 1] + pair[0].distance(&pair[1]));
+    }
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut next_m = 0.0;
+    for (observation_idx, pose) in poses.iter().enumerate() {
+        if travel_m[observation_idx] >= next_m - 1e-9 {
+            next_m = travel_m[observation_idx] + config.spacing_m;
+            let turn_rad = turn_at(config, poses, &travel_m, observation_idx);
+            samples.push(Sample { run_idx, observation_idx, position: pose.position(), turn_rad });
+        }
+    }
+    widen_turns(config, samples)
+}
+
+/// Angle between the chords to a position from some travel before and from it to some travel after.
+fn turn_at(config: &SemanticsConfig, poses: &[Pose2], travel_m: &[f64], at: usize) -> f64 {
+    let before = travel_m.partition_point(|&travel| travel < travel_m[at] - config.turn_reach_m);
+    let after = travel_m.partition_point(|&travel| travel <= travel_m[at] + config.turn_reach_m) - 1;
+    let direction = |from: usize, to: usize| {
+        let (dx, dy) = (poses[to].x - poses[from].x, poses[to].y - poses[from].y);
+        (dx.hypot(dy) > 1e-6).then(|| dy.atan2(dx))
+    };
+    match (direction(before, at), direction(at, after)) {
+        (Some(entering), Some(leaving)) => angle_between(entering, leaving),
+        _ => 0.0,
+    }
+}
+
+/// A corner reaches a little beyond the place where the way turns most.
+fn widen_turns(config: &SemanticsConfig, mut samples: Vec<Sample>) -> Vec<Sample> {
+    let reach = (config.smoothing_m / config.spacing_m).round() as usize;
+    let turns: Vec<f64> = samples.iter().map(|sample| sample.turn_rad).collect();
+    for (at, sample) in samples.iter_mut().enumerate() {
+        let around = &turns[at.saturating_sub(reach)..(at + reach + 1).min(turns.len())];
+        sample.turn_rad = around.iter().copied().fold(0.0, f64::max);
+    }
+    samples
+}
+
+/// The surroundings of positions that lie in one block.
+fn read_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Vec<PlaceSignature> {
+    let block = build_block(config, runs, samples);
+    let mut reader = SignatureReader::new(config, &block);
+    samples
+        .iter()
+        .map(|sample| match block.index(&sample.position) {
+            Some(cell) => reader.read(cell, sample.turn_rad),
+            None => PlaceSignature::default(),
+        })
+        .collect()
+}
+
+/// The map around positions, with the margin that their labels need.
+fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Block {
+    let lowest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MAX, f64::min);
+    let highest = |of: fn(&Point2) -> f64| samples.iter().map(|s| of(&s.position)).fold(f64::MIN, f64::max);
+    let (left, bottom) = (lowest(|p| p.x), lowest(|p| p.y));
+    let (right, top) = (highest(|p| p.x), highest(|p| p.y));
+    let margin_m = config.margin_m();
+    // Whole cells, so that the same place falls into the same cells whatever else is in its block.
+    let snap = |metres: f64| (metres / config.resolution_m).floor() * config.resolution_m;
+    let lower_left = Point2::new(snap(left - margin_m), snap(bottom - margin_m));
+    let edge_m = (right - left).max(top - bottom) + 2.0 * margin_m + config.resolution_m;
+    let mut evidence = BlockEvidence::new(config, lower_left, edge_m);
+    let is_near = |position: &Point2, reach_m: f64| {
+        position.x > lower_left.x - reach_m
+            && position.y > lower_left.y - reach_m
+            && position.x < lower_left.x + edge_m + reach_m
+            && position.y < lower_left.y + edge_m + reach_m
+    };
+    for run in runs {
+        for (map_from_robot, ranges_m) in &run.scans {
+            if is_near(&map_from_robot.position(), config.sight_m) {
+                evidence.add_scan(run.geometry, map_from_robot, ranges_m);
+            }
+        }
+        for pose in &run.map_from_observations {
+            if is_near(&pose.position(), config.driven_radius_m) {
+                evidence.add_driven(&pose.position());
+            }
+        }
+    }
+    evidence.finish()
+}
+
+/// Labels of all observations from those of the positions looked at.
+fn label_run(
+    config: &SemanticsConfig,
+    run: &DrivenRun<'_>,
+    signatures: Vec<(usize, PlaceSignature)>,
+) -> LabelledRun {
+    let raw: Vec<PlaceLabel> = signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
+    let reach = (config.smoothing_m / config.spacing_m).round() as usize;
+    let smooth: Vec<(PlaceLabel, f32)> = (0..raw.len()).map(|at| majority(&raw, at, reach)).collect();
+    let num_observations = run.map_from_observations.len();
+    let mut labels = Vec::with_capacity(num_observations);
+    let mut confidences = Vec::with_capacity(num_observations);
+    let mut nearest = 0;
+    for observation_idx in 0..num_observations {
+        let distance = |position: usize| signatures[position].0.abs_diff(observation_idx);
+        while nearest + 1 < signatures.len() && distance(nearest + 1) <= distance(nearest) {
+            nearest += 1;
+        }
+        let (label, confidence) = smooth[nearest];
+        labels.push(label);
+        confidences.push(confidence);
+    }
+    LabelledRun { labels, confidences, signatures }
+}
+
+/// The most frequent label within `reach` positions and its share; of equals the one in the middle, else the first.
+fn majority(labels: &[PlaceLabel], at: usize, reach: usize) -> (PlaceLabel, f32) {
+    let window = &labels[at.saturating_sub(reach)..(at + reach + 1).min(labels.len())];
+    let count = |label: PlaceLabel| window.iter().filter(|other| **other == label).count();
+    let mut best = labels[at];
+    for label in PlaceLabel::ALL {
+        if count(label) > count(best) {
+            best = label;
+        }
+    }
+    (best, count(best) as f32 / window.len() as f32)
+}

@@ -1,0 +1,307 @@
+//! What the server can be told: file < environment `LOCUTION_…` < flags, every value with a default that works.
+
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+
+use figment::Figment;
+use figment::providers::{Env, Format, Serialized, Toml};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// Everything the server can be told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ServerConfig {
+    /// Where to listen. Anything but a loopback address needs at least one key.
+    pub address: SocketAddr,
+    /// Directory of the embedded storage; made when missing.
+    pub data_directory: PathBuf,
+    /// Bounds on requests and queues.
+    pub limits: LimitsConfig,
+    /// The embedded storage.
+    pub storage: StorageConfig,
+    /// Background work.
+    pub builds: BuildsConfig,
+    /// What goes to the log.
+    pub log: LogConfig,
+    /// Who may do what. Without keys everything is allowed, but only from this machine.
+    pub keys: Vec<ApiKeyConfig>,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        Self {
+            address: SocketAddr::from(([127, 0, 0, 1], 7070)),
+            data_directory: PathBuf::from("locution-data"),
+            limits: LimitsConfig::default(),
+            storage: StorageConfig::default(),
+            builds: BuildsConfig::default(),
+            log: LogConfig::default(),
+            keys: Vec::new(),
+        }
+    }
+}
+
+/// Bounds that keep memory and latency in hand; what exceeds them is refused with 413, 422, 429 or 503.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LimitsConfig {
+    /// Largest request body, after decompression, bytes.
+    pub body_bytes_max: usize,
+    /// Most scans in one batch.
+    pub num_scans_per_batch_max: usize,
+    /// Most readings in one scan.
+    pub num_ranges_per_scan_max: usize,
+    /// Most runs in one site.
+    pub num_runs_per_site_max: u32,
+    /// Farthest the odometry may move from one scan to the next, metres; more is a teleport and refused.
+    pub odometry_step_max_m: f64,
+    /// Most requests being served at once; more are refused with 503.
+    pub num_requests_max: usize,
+    /// Most batches read, waiting or being translated at once; more are refused with 429.
+    pub num_batches_max: usize,
+    /// Most batches of one run at once; more are refused with 429.
+    pub num_batches_per_run_max: usize,
+    /// Runs whose translator is kept in memory; the one longest idle makes way and is resumed from storage.
+    pub num_open_runs_max: usize,
+    /// Most localisations at once.
+    pub num_localisations_max: usize,
+    /// Longest a request may take, seconds.
+    pub request_timeout_s: u64,
+}
+
+impl Default for LimitsConfig {
+    fn default() -> Self {
+        Self {
+            body_bytes_max: 16 << 20,
+            num_scans_per_batch_max: 5_000,
+            num_ranges_per_scan_max: 8_192,
+            num_runs_per_site_max: 10_000,
+            odometry_step_max_m: 5.0,
+            num_requests_max: 512,
+            num_batches_max: 64,
+            num_batches_per_run_max: 4,
+            num_open_runs_max: 256,
+            num_localisations_max: 32,
+            request_timeout_s: 600,
+        }
+    }
+}
+
+/// The embedded storage.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StorageConfig {
+    /// Bytes of pages that each open site may keep in memory.
+    pub cache_bytes_per_site: u64,
+    /// A run's translator is stored with its state after this many scans, so that resuming translates fewer again.
+    pub num_scans_per_checkpoint: u64,
+}
+
+impl Default for StorageConfig {
+    fn default() -> Self {
+        Self { cache_bytes_per_site: 32 << 20, num_scans_per_checkpoint: 1_000 }
+    }
+}
+
+/// Background work.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BuildsConfig {
+    /// Build a site's map by itself when one of its runs finishes.
+    pub is_automatic: bool,
+    /// How long to wait for further runs to finish before an automatic build starts, seconds.
+    pub settle_s: f64,
+    /// Most builds at once, over all sites.
+    pub num_builds_max: usize,
+    /// Map versions kept per site, the serving one included.
+    pub num_versions_kept: usize,
+}
+
+impl Default for BuildsConfig {
+    fn default() -> Self {
+        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 1, num_versions_kept: 5 }
+    }
+}
+
+/// What goes to the log.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct LogConfig {
+    /// Directives such as `info` or `locution_server=debug`.
+    pub filter: String,
+    /// One JSON object a line instead of text.
+    pub is_json: bool,
+}
+
+impl Default for LogConfig {
+    fn default() -> Self {
+        Self { filter: "info".into(), is_json: false }
+    }
+}
+
+/// What a key may do; each scope includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// Look, query, localise.
+    Read,
+    /// Also send runs, build maps and decide on matches.
+    Write,
+    /// Also make and delete sites.
+    Admin,
+}
+
+/// An API key, known by its hash only.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ApiKeyConfig {
+    /// For the log.
+    pub name: String,
+    /// SHA-256 of the key, 64 hexadecimal digits.
+    pub sha256: String,
+    /// What it may do.
+    pub scope: Scope,
+    /// Sites it may do it in; `*` means all.
+    pub sites: Vec<String>,
+}
+
+/// A configuration that the server cannot start with.
+#[derive(Debug, Error)]
+pub enum ServerConfigError {
+    /// A file, variable or flag could not be read as configuration.
+    #[error("{0}")]
+    Unreadable(Box<figment::Error>),
+    /// A value cannot work.
+    #[error("{field}: {problem}")]
+    Invalid {
+        /// Path of the value.
+        field: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+}
+
+impl ServerConfig {
+    /// Lays the file (when given), the environment and the flags over the defaults.
+    ///
+    /// Variables are named after the fields, `__` between levels: `LOCUTION_LIMITS__NUM_BATCHES_MAX=8`.
+    ///
+    /// # Errors
+    /// The first value that cannot be read, naming its source, or that cannot work.
+    pub fn load(file: Option<&Path>, flags: &impl Serialize) -> Result<Self, ServerConfigError> {
+        let mut figment = Figment::from(Serialized::defaults(ServerConfig::default()));
+        if let Some(file) = file {
+            figment = figment.merge(Toml::file_exact(file));
+        }
+        let config: ServerConfig = figment
+            .merge(environment())
+            .merge(Serialized::defaults(flags))
+            .extract()
+            .map_err(|error| ServerConfigError::Unreadable(Box::new(error)))?;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// The first value that cannot work, by its path.
+    pub fn validate(&self) -> Result<(), ServerConfigError> {
+        let invalid = |field: &str, problem: &str| {
+            Err(ServerConfigError::Invalid { field: field.into(), problem: problem.into() })
+        };
+        if !self.address.ip().is_loopback() && self.keys.is_empty() {
+            return invalid("address", "listening beyond this machine needs at least one entry in `keys`");
+        }
+        let limits = &self.limits;
+        let positive = [
+            ("limits.body_bytes_max", limits.body_bytes_max),
+            ("limits.num_scans_per_batch_max", limits.num_scans_per_batch_max),
+            ("limits.num_ranges_per_scan_max", limits.num_ranges_per_scan_max),
+            ("limits.num_requests_max", limits.num_requests_max),
+            ("limits.num_batches_max", limits.num_batches_max),
+            ("limits.num_batches_per_run_max", limits.num_batches_per_run_max),
+            ("limits.num_open_runs_max", limits.num_open_runs_max),
+            ("builds.num_builds_max", self.builds.num_builds_max),
+            ("builds.num_versions_kept", self.builds.num_versions_kept),
+        ];
+        for (field, value) in positive {
+            if value == 0 {
+                return invalid(field, "must be at least 1");
+            }
+        }
+        if limits.num_ranges_per_scan_max > 65_536 {
+            return invalid("limits.num_ranges_per_scan_max", "must be at most 65536");
+        }
+        if self.storage.num_scans_per_checkpoint == 0 {
+            return invalid("storage.num_scans_per_checkpoint", "must be at least 1");
+        }
+        if !(limits.odometry_step_max_m > 0.0 && limits.odometry_step_max_m.is_finite()) {
+            return invalid("limits.odometry_step_max_m", "must be a positive number of metres");
+        }
+        if !(self.builds.settle_s >= 0.0 && self.builds.settle_s <= 86_400.0) {
+            return invalid("builds.settle_s", "must lie between 0 and 86400 seconds");
+        }
+        for (idx, key) in self.keys.iter().enumerate() {
+            if key.sha256.len() != 64 || !key.sha256.bytes().all(|byte| byte.is_ascii_hexdigit()) {
+                return invalid(&format!("keys[{idx}].sha256"), "must be 64 hexadecimal digits");
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Variables that begin with the name of a field. Others of the prefix belong to other tools, such as the tests.
+fn environment() -> Env {
+    const FIELDS: [&str; 7] = ["address", "data_directory", "limits", "storage", "builds", "log", "keys"];
+    let is_ours = |key: &figment::value::UncasedStr| {
+        let key = key.as_str().to_ascii_lowercase();
+        FIELDS.iter().any(|field| key == *field || key.starts_with(&format!("{field}__")))
+    };
+    Env::prefixed("LOCUTION_").filter(is_ours).split("__")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_defaults_work_and_survive_printing() {
+        let config = ServerConfig::default();
+        config.validate().unwrap();
+        let printed = toml::to_string(&config).unwrap();
+        assert_eq!(toml::from_str::<ServerConfig>(&printed).unwrap(), config);
+    }
+
+    #[test]
+    fn other_machines_are_refused_without_a_key() {
+        let mut config = ServerConfig { address: "0.0.0.0:7070".parse().unwrap(), ..Default::default() };
+        assert!(config.validate().unwrap_err().to_string().starts_with("address"));
+        config.keys.push(ApiKeyConfig {
+            name: "fleet".into(),
+            sha256: "0".repeat(64),
+            scope: Scope::Write,
+            sites: vec!["*".into()],
+        });
+        config.validate().unwrap();
+    }
+
+    #[test]
+    fn flags_win_over_the_file() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "address = \"127.0.0.1:1\"\n[limits]\nnum_batches_max = 3\n").unwrap();
+        let flags = serde_json::json!({"address": "127.0.0.1:2"});
+        let config = ServerConfig::load(Some(file.path()), &flags).unwrap();
+        assert_eq!(config.address.port(), 2);
+        assert_eq!(config.limits.num_batches_max, 3);
+    }
+
+    #[test]
+    fn unknown_fields_are_named() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), "[limits]\nnum_bathces_max = 3\n").unwrap();
+        let error = ServerConfig::load(Some(file.path()), &serde_json::json!({})).unwrap_err();
+        assert!(error.to_string().contains("num_bathces_max"), "{error}");
+    }
+}

@@ -1,0 +1,10 @@
+//! What goes over the wire: plain types with units in their names, and the one gate into the engine's types.
+
+pub mod batches;
+pub mod common;
+pub mod jobs;
+pub mod localisations;
+pub mod maps;
+pub mod runs;
+pub mod sites;
+pub mod texts;

@@ -1,0 +1,185 @@
+//! The one way in which anything fails towards a client: RFC 9457 problem details.
+
+use axum::Json;
+use axum::http::{HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::app::AppError;
+use crate::storage::StorageError;
+
+/// Where the types of problems are named; the address need not answer.
+const TYPE_PREFIX: &str = "https://locution.dev/problems/";
+
+/// What went wrong (RFC 9457).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct Problem {
+    /// Stable name of the kind of problem.
+    #[serde(rename = "type")]
+    #[schema(example = "https://locution.dev/problems/invalid-scan")]
+    pub kind: String,
+    /// The kind in words.
+    #[schema(example = "A scan cannot be")]
+    pub title: String,
+    /// The HTTP status.
+    #[schema(example = 422)]
+    pub status: u16,
+    /// This very problem in words.
+    pub detail: String,
+    /// Path of the offending value in the request.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schema(example = "scans[3].ranges_m[17]")]
+    pub field: Option<String>,
+    /// The sequence number that continues the run.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub expected_sequence: Option<u64>,
+}
+
+/// A refusal or failure on its way to the client.
+#[derive(Clone, Debug)]
+pub struct ApiError {
+    problem: Problem,
+    retry_after_s: Option<u64>,
+}
+
+impl ApiError {
+    /// A problem of a status, by the last part of its type.
+    pub fn new(status: StatusCode, slug: &str, title: &str, detail: impl Into<String>) -> Self {
+        let problem = Problem {
+            kind: format!("{TYPE_PREFIX}{slug}"),
+            title: title.to_owned(),
+            status: status.as_u16(),
+            detail: detail.into(),
+            field: None,
+            expected_sequence: None,
+        };
+        Self { problem, retry_after_s: None }
+    }
+
+    /// Says which value of the request is meant.
+    pub fn at(mut self, field: impl Into<String>) -> Self {
+        self.problem.field = Some(field.into());
+        self
+    }
+
+    /// Says when to ask again.
+    pub fn retry_after(mut self, seconds: u64) -> Self {
+        self.retry_after_s = Some(seconds);
+        self
+    }
+
+    fn expecting(mut self, sequence: u64) -> Self {
+        self.problem.expected_sequence = Some(sequence);
+        self
+    }
+
+    /// 400: the body cannot be read.
+    pub fn malformed(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::BAD_REQUEST, "malformed-body", "The body cannot be read", detail)
+    }
+
+    /// 422: a well-formed value that cannot be.
+    pub fn invalid(field: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-value", "A value cannot be", detail).at(field)
+    }
+
+    /// 422: a value of a scan that cannot be.
+    pub fn invalid_scan(field: impl Into<String>, detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-scan", "A scan cannot be", detail).at(field)
+    }
+
+    /// 404: no such thing.
+    pub fn not_found(detail: impl Into<String>) -> Self {
+        Self::new(StatusCode::NOT_FOUND, "not-found", "There is no such thing", detail)
+    }
+
+    /// 503: too much at once.
+    pub fn overloaded() -> Self {
+        let detail = "more requests are being served than the server allows at once";
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "overloaded", "The server is busy", detail).retry_after(1)
+    }
+
+    /// A problem for a status that was answered without one, such as by a middleware.
+    pub fn of_status(status: StatusCode) -> Self {
+        let title = status.canonical_reason().unwrap_or("The request failed");
+        let slug = title.to_ascii_lowercase().replace(' ', "-");
+        Self::new(status, &slug, title, title)
+    }
+}
+
+impl From<AppError> for ApiError {
+    fn from(error: AppError) -> Self {
+        let detail = error.to_string();
+        match error {
+            AppError::NotFound { .. } => Self::not_found(detail),
+            AppError::Exists { .. } => {
+                Self::new(StatusCode::CONFLICT, "exists", "It exists and is different", detail)
+            }
+            AppError::Sequence { expected_sequence, .. } => {
+                Self::new(StatusCode::CONFLICT, "sequence", "The batch does not continue the run", detail)
+                    .at("first_sequence")
+                    .expecting(expected_sequence)
+            }
+            AppError::Finished { expected_sequence, .. } => {
+                Self::new(StatusCode::CONFLICT, "finished", "The run is finished", detail)
+                    .expecting(expected_sequence)
+            }
+            AppError::Invalid { field, is_scan: true, .. } => Self::invalid_scan(field, detail),
+            AppError::Invalid { field, .. } => Self::invalid(field, detail),
+            AppError::NotReady { .. } => {
+                Self::new(StatusCode::CONFLICT, "not-ready", "Something must be made first", detail)
+            }
+            AppError::Busy { retry_after, .. } => {
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "A queue is full", detail)
+                    .retry_after(retry_after.as_secs().max(1))
+            }
+            AppError::Storage(error) => Self::from(error),
+            AppError::Internal { what } => {
+                tracing::error!(what, "internal error");
+                Self::new(
+                    StatusCode::INTERNAL_SERVER_ERROR,
+                    "internal",
+                    "A bug of ours",
+                    "see the server's log",
+                )
+            }
+        }
+    }
+}
+
+impl From<StorageError> for ApiError {
+    fn from(error: StorageError) -> Self {
+        let detail = error.to_string();
+        let unavailable = |seconds| {
+            Self::new(
+                StatusCode::SERVICE_UNAVAILABLE,
+                "storage",
+                "The storage cannot serve now",
+                detail.clone(),
+            )
+            .retry_after(seconds)
+        };
+        match error {
+            StorageError::Conflict | StorageError::Fenced => unavailable(1),
+            StorageError::Unavailable { retry_after, .. } => unavailable(retry_after.as_secs().max(1)),
+            StorageError::Corrupt { .. } | StorageError::ValueTooLarge { .. } => {
+                tracing::error!(error = detail, "the storage failed");
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Stored data cannot be read", detail)
+            }
+        }
+    }
+}
+
+impl IntoResponse for ApiError {
+    fn into_response(self) -> Response {
+        let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let mut response = (status, Json(self.problem)).into_response();
+        let headers = response.headers_mut();
+        headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if let Some(seconds) = self.retry_after_s {
+            headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
+        }
+        response
+    }
+}

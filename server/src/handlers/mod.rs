@@ -1,0 +1,20 @@
+//! One file per resource; a handler extracts, calls one use case and wraps the answer.
+
+pub mod batches;
+pub mod encodings;
+pub mod jobs;
+pub mod localisations;
+pub mod maps;
+pub mod matches;
+pub mod operations;
+pub mod runs;
+pub mod sites;
+pub mod texts;
+
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+
+/// A plain-text answer.
+pub(crate) fn text(body: String) -> Response {
+    ([(header::CONTENT_TYPE, "text/plain; charset=utf-8")], body).into_response()
+}

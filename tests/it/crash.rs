@@ -1,0 +1,139 @@
+//! The real binary, killed at random moments, loses nothing that it acknowledged.
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use locution_tests::{Api, drive};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde_json::{Value, json};
+
+const NUM_KILLS: usize = 20;
+const NUM_SCANS_PER_BATCH: usize = 40;
+
+/// A server process; killed when dropped.
+struct Process {
+    child: Child,
+    api: Api,
+}
+
+impl Process {
+    fn start(binary: &Path, directory: &Path) -> Self {
+        let mut child = Command::new(binary)
+            .args(["serve", "--address", "127.0.0.1:0", "--data-directory"])
+            .arg(directory)
+            .env("LOCUTION_STORAGE__NUM_SCANS_PER_CHECKPOINT", "150")
+            .env_remove("LOCUTION_BIN")
+            .env("LOCUTION_BUILDS__IS_AUTOMATIC", "false")
+            .env("LOCUTION_LOG__FILTER", "error")
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).unwrap();
+        let url = line.trim().strip_prefix("listening on ").unwrap_or_else(|| panic!("no address: {line}"));
+        let api = Api::new(url.to_owned());
+        Self { child, api }
+    }
+
+    /// SIGKILL: no destructor, no flush, no goodbye.
+    fn kill(&mut self) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+    }
+}
+
+impl Drop for Process {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+/// The binary named by `LOCUTION_BIN`, else built here.
+fn binary() -> PathBuf {
+    if let Some(path) = std::env::var_os("LOCUTION_BIN") {
+        return path.into();
+    }
+    let build = escargot::CargoBuild::new().package("locution-server").bin("locution").release();
+    build.current_target().run().unwrap().path().to_owned()
+}
+
+async fn post(api: &Api, first: usize, scans: &[Value]) -> Option<Value> {
+    let body = serde_json::to_vec(&json!({"first_sequence": first, "scans": scans})).unwrap();
+    let headers = [("content-type", "application/json")];
+    let answer = api.send(reqwest::Method::POST, "/v1/sites/a/runs/r/batches", &headers, body).await.ok()?;
+    Some(answer.ok())
+}
+
+/// Posts from where the server stands until it dies or all is sent; the highest acknowledged number.
+async fn post_until_killed(api: &Api, scans: &[Value], from: usize) -> usize {
+    let mut next = from;
+    while next < scans.len() {
+        let end = scans.len().min(next + NUM_SCANS_PER_BATCH);
+        let Some(receipt) = post(api, next, &scans[next..end]).await else { break };
+        next = receipt["next_sequence"].as_u64().unwrap() as usize;
+        assert_eq!(next, end);
+    }
+    next
+}
+
+async fn everything(api: &Api) -> Vec<String> {
+    let mut texts = Vec::new();
+    for level in 0..3 {
+        texts
+            .push(Value::from(api.all(&format!("/v1/sites/a/runs/r/words?level={level}")).await).to_string());
+    }
+    texts.push(Value::from(api.all("/v1/sites/a/runs/r/observations").await).to_string());
+    texts.push(api.get_text("/v1/sites/a/runs/r/trajectory").await);
+    texts.push(Value::from(api.all("/v1/sites/a/runs/r/scans").await).to_string());
+    texts
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn twenty_kills_lose_nothing_and_change_no_byte() {
+    let binary = binary();
+    let scans = drive(12_000, 11);
+    let mut rng = ChaCha8Rng::seed_from_u64(20);
+    let directory = tempfile::tempdir().unwrap();
+    let mut process = Process::start(&binary, directory.path());
+    process.api.make_run("a", "r").await;
+    let mut num_acknowledged = 0;
+    let mut num_kills = 0;
+    while num_kills < NUM_KILLS {
+        let (api, to_send) = (process.api.clone(), scans.clone());
+        let from = num_acknowledged;
+        let client = tokio::spawn(async move { post_until_killed(&api, &to_send, from).await });
+        tokio::time::sleep(Duration::from_micros(rng.random_range(1_000..150_000))).await;
+        process.kill();
+        num_kills += 1;
+        num_acknowledged = client.await.unwrap();
+        process = Process::start(&binary, directory.path());
+        let run = process.api.get("/v1/sites/a/runs/r").await.ok();
+        let num_stored = run["num_scans"].as_u64().unwrap() as usize;
+        // A batch may have become durable without its answer reaching the client.
+        assert!(num_stored >= num_acknowledged, "{num_acknowledged} acknowledged, {num_stored} there");
+        assert!(num_stored <= num_acknowledged + NUM_SCANS_PER_BATCH);
+        num_acknowledged = if rng.random_bool(0.5) { num_stored } else { num_acknowledged };
+        if num_acknowledged >= scans.len() {
+            break;
+        }
+    }
+    println!("{num_kills} kills, the last one after {num_acknowledged} of {} scans", scans.len());
+    assert_eq!(num_kills, NUM_KILLS, "the recording was too short to be interrupted often enough");
+    assert_eq!(post_until_killed(&process.api, &scans, num_acknowledged).await, scans.len());
+    process.api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
+    let interrupted = everything(&process.api).await;
+    process.kill();
+
+    let fresh = tempfile::tempdir().unwrap();
+    let undisturbed = Process::start(&binary, fresh.path());
+    undisturbed.api.make_run("a", "r").await;
+    assert_eq!(post_until_killed(&undisturbed.api, &scans, 0).await, scans.len());
+    undisturbed.api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
+    for (interrupted, undisturbed) in interrupted.iter().zip(&everything(&undisturbed.api).await) {
+        assert!(interrupted == undisturbed, "the texts differ");
+    }
+}
