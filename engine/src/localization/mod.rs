@@ -3,7 +3,11 @@
 //! ```text
 //!   GridMap ─► ServedMap: density fields, likelihood field        (once per map version)
 //!   odometry, measurement ─► ParticleFilter: predict ─► weigh ─► resample ─► hypotheses
+//!   scans ─► Localizer: search ─► follow ─► judge ─► lost, ambiguous or converged
 //! ```
+//!
+//! [`Localizer`] is a session as it is served; it searches the map for the robot's surroundings and judges every place
+//! by all the scans of the last metres.
 //!
 //! A measurement is a [`SensorModel`]: free-space densities ([`DensityModel`], the thesis' own), a scan against the
 //! likelihood field ([`LikelihoodFieldModel`], for tracking) or the thesis' two rivals ([`BeamModel`]). Every random
@@ -12,6 +16,7 @@
 mod arc_planes;
 mod beam_models;
 mod bit_window;
+mod config;
 mod connected_disc;
 mod density_field;
 mod density_gradient;
@@ -36,9 +41,12 @@ mod track;
 mod turns;
 
 #[cfg(test)]
+mod session_tests;
+#[cfg(test)]
 mod tests;
 
 pub use beam_models::{BeamComparison, BeamModel, BeamModelConfig};
+pub use config::LocalizationConfig;
 pub use density_field::{DensityField, DensityFieldConfig, KernelReading, MAX_KERNELS, observe};
 pub use density_gradient::GradientConfig;
 pub use density_model::{DensityModel, DensityModelConfig};

@@ -40,6 +40,10 @@ pub struct SubmapConfig {
     pub max_iterations: usize,
     /// This many returns count as one independent measurement.
     pub correlated_returns: f64,
+    /// Offsets this far are tried to see whether the fit could slide, metres.
+    pub spread_half_m: f64,
+    /// An offset that loses this many returns has 1/e of the weight.
+    pub spread_returns_per_e: f64,
 }
 
 impl Default for SubmapConfig {
@@ -60,6 +64,8 @@ impl Default for SubmapConfig {
             min_count: 4,
             max_iterations: 10,
             correlated_returns: 10.0,
+            spread_half_m: 2.4,
+            spread_returns_per_e: 3.0,
         }
     }
 }

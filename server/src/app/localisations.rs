@@ -152,16 +152,7 @@ impl App {
             latest_use: Mutex::new(Instant::now()),
             search: tokio::sync::Mutex::new(search),
         };
-        let mut table = self.localisations.table();
-        table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
-        if table.sessions.len() >= self.config().limits.num_localisations_max {
-            let queue = "the table of localisations";
-            return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
-        }
-        table.next_id += 1;
-        let id = table.next_id;
-        table.sessions.insert(id, Arc::new(session));
-        drop(table);
+        let id = self.localisations.insert(session, self.config().limits.num_localisations_max)?;
         self.localisation(site, id).await
     }
 
@@ -304,6 +295,20 @@ impl App {
 }
 
 impl Localisations {
+    /// Keeps a session when there is room after the idle ones went.
+    fn insert(&self, session: Session, num_max: usize) -> Result<u64, AppError> {
+        let mut table = self.table();
+        table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
+        if table.sessions.len() >= num_max {
+            let queue = "the table of localisations";
+            return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
+        }
+        table.next_id += 1;
+        let id = table.next_id;
+        table.sessions.insert(id, Arc::new(session));
+        Ok(id)
+    }
+
     fn table(&self) -> std::sync::MutexGuard<'_, SessionTable> {
         self.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
