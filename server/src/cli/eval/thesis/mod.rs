@@ -214,9 +214,9 @@ fn chapter_5(arguments: &ThesisArguments, published: &Published) -> Result<Vec<M
     Ok(measured)
 }
 
-/// Single level against two levels: level 0 with a fixed threshold, level 1 with all.
+/// Single level against two levels: level 0 with a fixed threshold, level 1 with all from 3 words on.
 fn figures_5_9_and_5_10(out: &Path, scenario: &Scenario, texts: &Texts) -> Result<()> {
-    let two_levels = MatchingConfig { min_chain_words: vec![1, 1], ..MatchingConfig::default() };
+    let two_levels = MatchingConfig { min_chain_words: vec![2, 3], ..MatchingConfig::default() };
     let (chains, _) = chains_of(texts, &two_levels);
     let words = |found: &FoundChain| found.chain.pairs.len();
     let single = sweep(texts, &chains, |chain| (chain.max_level == 0).then_some(chain.pairs.len() as f64));
