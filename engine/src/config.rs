@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
+use crate::localization::LocalizationConfig;
 use crate::matching::MatchingConfig;
 use crate::registration::RegistrationConfig;
 use crate::retrieval::RetrievalConfig;
@@ -40,6 +41,8 @@ pub struct EngineConfig {
     pub registration: RegistrationConfig,
     /// How places are retrieved by their density profiles.
     pub retrieval: RetrievalConfig,
+    /// How robots are found in the map.
+    pub localization: LocalizationConfig,
 }
 
 impl EngineConfig {
@@ -52,6 +55,7 @@ impl EngineConfig {
         self.matching.validate("matching")?;
         self.registration.validate("registration")?;
         self.retrieval.validate("retrieval")?;
+        self.localization.validate("localization")?;
         Ok(())
     }
 }
