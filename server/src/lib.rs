@@ -10,6 +10,7 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, OnceLock};
 
+use axum::serve::ListenerExt;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use thiserror::Error;
 use tokio::net::TcpListener;
@@ -111,6 +112,10 @@ pub async fn start_server(config: ServerConfig) -> Result<RunningServer, StartEr
     };
     let (stop, mut stopped) = watch::channel(false);
     let service = router::build_router(state);
+    // Small answers must not wait for the acknowledgement of the ones before.
+    let listener = listener.tap_io(|stream| {
+        let _ = stream.set_nodelay(true);
+    });
     let serving = tokio::spawn(async move {
         let until_stopped = async move {
             let _ = stopped.wait_for(|is_stopped| *is_stopped).await;

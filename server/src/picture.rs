@@ -15,7 +15,7 @@ const PIXELS_PER_METRE_MAX: f64 = 20.0;
 /// Empty space around and between components, metres.
 const MARGIN_M: f64 = 2.0;
 
-const PAPER: [u8; 3] = [250, 249, 246];
+const PAPER: [u8; 3] = [236, 234, 228];
 const FLOOR: [u8; 3] = [255, 255, 255];
 const WALL: [u8; 3] = [44, 48, 58];
 const MATCH: [u8; 3] = [232, 163, 23];

@@ -20,7 +20,9 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::auth;
 use crate::error::ApiError;
-use crate::handlers::{batches, jobs, localisations, maps, matches, operations, runs, sites, texts};
+use crate::handlers::{
+    batches, jobs, labels, localisations, maps, matches, operations, queries, runs, sites, texts,
+};
 use crate::openapi::{self, Document};
 use crate::state::AppState;
 
@@ -61,6 +63,9 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(localisations::get_localisation, localisations::close_localisation))
         .routes(routes!(localisations::localise))
         .routes(routes!(localisations::query_example))
+        .routes(routes!(queries::query_words))
+        .routes(routes!(labels::list_labels))
+        .routes(routes!(labels::query_labels))
         .routes(routes!(localisations::query_example_everywhere))
 }
 

@@ -66,10 +66,7 @@ pub struct MappingConfig {
 impl Default for MappingConfig {
     fn default() -> Self {
         Self {
-            retrieval: RetrievalConfig {
-                query_step_m: 2.0,
-                ..RetrievalConfig::default()
-            },
+            retrieval: RetrievalConfig { query_step_m: 2.0, ..RetrievalConfig::default() },
             submap: SubmapConfig::default(),
             pose_graph: PoseGraphConfig::default(),
             anchor_spacing_m: 2.0,

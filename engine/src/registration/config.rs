@@ -6,16 +6,6 @@ use serde::{Deserialize, Serialize};
 use crate::config::ConfigError;
 use crate::geometry::Pose2;
 
-/// Everything about registering scans and submaps.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RegistrationConfig {
-    /// Scan against recent scans.
-    pub refiner: RefinerConfig,
-    /// Submap against submap.
-    pub submap: SubmapConfig,
-}
-
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -50,6 +40,10 @@ pub struct SubmapConfig {
     pub max_iterations: usize,
     /// This many returns count as one independent measurement.
     pub correlated_returns: f64,
+    /// Offsets this far are tried to see whether the fit could slide, metres.
+    pub spread_half_m: f64,
+    /// An offset that loses this many returns has 1/e of the weight.
+    pub spread_returns_per_e: f64,
 }
 
 impl Default for SubmapConfig {
@@ -70,6 +64,8 @@ impl Default for SubmapConfig {
             min_count: 4,
             max_iterations: 10,
             correlated_returns: 10.0,
+            spread_half_m: 2.4,
+            spread_returns_per_e: 3.0,
         }
     }
 }
@@ -193,17 +189,6 @@ impl Default for RefinerConfig {
             search_radius_m: 20.0,
             odometry: OdometryNoise::default(),
         }
-    }
-}
-
-impl RegistrationConfig {
-    /// Checks every value; `path` is this struct's own path.
-    ///
-    /// # Errors
-    /// The first field that cannot work.
-    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        self.refiner.validate(&format!("{path}.refiner"))?;
-        self.submap.validate(&format!("{path}.submap"))
     }
 }
 

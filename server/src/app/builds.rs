@@ -5,10 +5,11 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::{Decision, Keyframe, MappingConfig, RunRecord, SiteMap, map_site};
+use locution_engine::mapping::{Decision, Keyframe, MappedRun, RunRecord, SiteMap, map_site};
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
+use super::labels::{StoredLabel, label_map};
 use super::maps::WrittenRun;
 use super::reading::{read_keyframes, read_observations, read_words};
 use super::runs::{RunInfo, read_run};
@@ -72,9 +73,10 @@ impl App {
         progress.at(0.1, "matching places and optimising the graph");
         let decisions = site.decisions().await?;
         let written: Vec<WrittenRun> = runs.iter().map(written_run).collect();
-        let map = map_runs(site, Arc::clone(&state.config), runs, decisions).await?;
+        let (map, labels) = map_runs(site, Arc::clone(&state.config), runs, decisions).await?;
         progress.at(0.9, "writing the map");
-        let record = site.write_map(&map, &written, started.elapsed().as_secs_f64()).await?;
+        let duration_s = started.elapsed().as_secs_f64();
+        let record = site.write_map(&map, &labels, &written, duration_s).await?;
         site.serve_map(record.version, self.num_versions_kept()).await?;
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
         Ok(format!(
@@ -118,14 +120,22 @@ fn written_run(run: &LoadedRun) -> WrittenRun {
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
-    _config: Arc<EngineConfig>,
+    config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
-) -> Result<SiteMap, AppError> {
+) -> Result<(SiteMap, Vec<Vec<StoredLabel>>), AppError> {
+    if runs.iter().all(|run| run.keyframes.is_empty()) {
+        let nowhere = MappedRun::default();
+        let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
+        return Ok((map, vec![Vec::new(); runs.len()]));
+    }
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
     let (memo, outcome) = on_blocking_thread(move || {
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site(&MappingConfig::default(), &records, &decisions, &mut memo);
+        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|map| {
+            let labels = label_map(&records, &map);
+            (map, labels)
+        });
         (memo, outcome)
     })
     .await?;

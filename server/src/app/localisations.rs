@@ -10,8 +10,8 @@ use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
 use locution_engine::localization::{
-    CellState, DensityFieldConfig, GridMap, LikelihoodFieldConfig, LocalizationState, Localizer, LocalizerConfig,
-    ServedMap,
+    CellState, DensityFieldConfig, GridMap, LikelihoodFieldConfig, LocalizationState, Localizer,
+    LocalizerConfig, ServedMap,
 };
 use locution_engine::scan::{Scan, ScanGeometry};
 
@@ -94,8 +94,11 @@ impl Search {
     }
 
     fn estimate(&self) -> (LocalizationState, f64, Vec<LocatedHypothesis>) {
-        let estimates: Vec<_> =
-            self.parts.iter().map(|(component, map, localizer)| (*component, localizer.estimate(map))).collect();
+        let estimates: Vec<_> = self
+            .parts
+            .iter()
+            .map(|(component, map, localizer)| (*component, localizer.estimate(map)))
+            .collect();
         let mut odds_sum = 0.0;
         let mut hypotheses = Vec::new();
         for (component, estimate) in &estimates {
@@ -149,16 +152,7 @@ impl App {
             latest_use: Mutex::new(Instant::now()),
             search: tokio::sync::Mutex::new(search),
         };
-        let mut table = self.localisations.table();
-        table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
-        if table.sessions.len() >= self.config().limits.num_localisations_max {
-            let queue = "the table of localisations";
-            return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
-        }
-        table.next_id += 1;
-        let id = table.next_id;
-        table.sessions.insert(id, Arc::new(session));
-        drop(table);
+        let id = self.localisations.insert(session, self.config().limits.num_localisations_max)?;
         self.localisation(site, id).await
     }
 
@@ -173,14 +167,26 @@ impl App {
         let next_sequence = search.next_sequence;
         drop(search);
         let (state, travel_m, hypotheses) = on_blocking_thread(move || estimating.estimate()).await?;
-        Ok(LocalisationInfo { id, map_version: session.map_version, state, next_sequence, travel_m, hypotheses })
+        Ok(LocalisationInfo {
+            id,
+            map_version: session.map_version,
+            state,
+            next_sequence,
+            travel_m,
+            hypotheses,
+        })
     }
 
     /// Feeds a session. Scans it has seen are passed over; a gap is refused.
     ///
     /// # Errors
     /// [`AppError::Sequence`], [`AppError::Invalid`], [`AppError::NotFound`].
-    pub async fn localise(&self, site: &Site, id: u64, batch: NewBatch) -> Result<LocalisationInfo, AppError> {
+    pub async fn localise(
+        &self,
+        site: &Site,
+        id: u64,
+        batch: NewBatch,
+    ) -> Result<LocalisationInfo, AppError> {
         let session = self.session(site, id)?;
         let mut search = session.search.lock().await;
         let expected_sequence = search.next_sequence;
@@ -243,7 +249,12 @@ impl App {
         .await
     }
 
-    async fn new_search(&self, site: &Site, map: &MapRecord, geometry: &ScanGeometry) -> Result<Search, AppError> {
+    async fn new_search(
+        &self,
+        site: &Site,
+        map: &MapRecord,
+        geometry: &ScanGeometry,
+    ) -> Result<Search, AppError> {
         let mut sizes: BTreeMap<u32, u64> = BTreeMap::new();
         for run in map.runs.iter().filter(|run| run.num_poses > 0) {
             *sizes.entry(run.component).or_default() += run.num_poses;
@@ -259,7 +270,12 @@ impl App {
     }
 
     /// A component with the fields that localisation looks things up in.
-    async fn served_map(&self, site: &Site, map: &MapRecord, component: u32) -> Result<Arc<ServedMap>, AppError> {
+    async fn served_map(
+        &self,
+        site: &Site,
+        map: &MapRecord,
+        component: u32,
+    ) -> Result<Arc<ServedMap>, AppError> {
         let key = (site.name().to_string(), map.version, component);
         let mut served_maps = self.served_maps.lock().await;
         if let Some(served) = served_maps.get(&key) {
@@ -279,6 +295,20 @@ impl App {
 }
 
 impl Localisations {
+    /// Keeps a session when there is room after the idle ones went.
+    fn insert(&self, session: Session, num_max: usize) -> Result<u64, AppError> {
+        let mut table = self.table();
+        table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
+        if table.sessions.len() >= num_max {
+            let queue = "the table of localisations";
+            return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
+        }
+        table.next_id += 1;
+        let id = table.next_id;
+        table.sessions.insert(id, Arc::new(session));
+        Ok(id)
+    }
+
     fn table(&self) -> std::sync::MutexGuard<'_, SessionTable> {
         self.table.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -7,6 +7,7 @@ use locution_engine::mapping::{PlaceMatch, SiteMap};
 use locution_engine::scan::Scan;
 use serde::{Deserialize, Serialize};
 
+use super::labels::StoredLabel;
 use super::matches::StoredMatches;
 use super::records::StoredRun;
 use super::runs::read_run;
@@ -19,6 +20,8 @@ use crate::storage::{Batch, StorageError, codec};
 
 /// Poses stand under this kind of map part.
 const POSES: u8 = 1;
+/// Labels of observations stand under this one.
+const LABELS: u8 = 2;
 /// A commit is closed when its values take more than this.
 const COMMIT_BYTES_MAX: usize = 4 << 20;
 /// Keys deleted in one commit.
@@ -54,6 +57,10 @@ pub struct MapRun {
     pub first_pose: u64,
     /// Number of its keyframes.
     pub num_poses: u64,
+    /// Number of its first observation among the version's labels.
+    pub first_label: u64,
+    /// Number of its observations.
+    pub num_labels: u64,
     /// Scans it had when the map was built.
     pub num_scans: u64,
     /// Metres driven, along the optimised keyframes.
@@ -123,6 +130,21 @@ impl Site {
         Ok(series::read(&**self.store(), &prefix, key, range, usize::MAX).await?)
     }
 
+    /// Labels of a run's observations in a version.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub(super) async fn stored_labels(
+        &self,
+        map: &MapRecord,
+        run: &MapRun,
+    ) -> Result<Vec<StoredLabel>, AppError> {
+        let prefix = Key::all_map_parts(map.version, LABELS);
+        let key = |first| Key::MapPart(map.version, LABELS, first);
+        let range = run.first_label..run.first_label + run.num_labels;
+        Ok(series::read(&**self.store(), &prefix, key, range, usize::MAX).await?)
+    }
+
     /// All runs of a version that are in a component, or all.
     ///
     /// # Errors
@@ -168,6 +190,7 @@ impl Site {
     pub(super) async fn write_map(
         &self,
         map: &SiteMap,
+        labels: &[Vec<StoredLabel>],
         runs: &[WrittenRun],
         duration_s: f64,
     ) -> Result<MapRecord, AppError> {
@@ -183,8 +206,8 @@ impl Site {
             duration_s,
         };
         let mut batch = Batch::default();
-        let mut first_pose = 0;
-        for (written, mapped) in runs.iter().zip(&map.runs) {
+        let (mut first_pose, mut first_label) = (0, 0);
+        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(labels) {
             let poses: Vec<MapPose> = written
                 .keyframe_seqs
                 .iter()
@@ -192,12 +215,15 @@ impl Site {
                 .map(|(scan_seq, pose)| MapPose { scan_seq: *scan_seq, map_from_robot: *pose })
                 .collect();
             series::append(&mut batch, &poses, first_pose, |n| Key::MapPart(version, POSES, n));
+            series::append(&mut batch, labels, first_label, |n| Key::MapPart(version, LABELS, n));
             record.runs.push(MapRun {
                 run: written.run,
                 name: written.name.clone(),
                 component: mapped.component,
                 first_pose,
                 num_poses: poses.len() as u64,
+                first_label,
+                num_labels: labels.len() as u64,
                 num_scans: written.num_scans,
                 length_m: poses
                     .windows(2)
@@ -205,6 +231,7 @@ impl Site {
                     .sum(),
             });
             first_pose += poses.len() as u64;
+            first_label += labels.len() as u64;
             self.commit_when_large(&mut batch).await?;
         }
         for chunk in StoredMatches::chunks(&map.matches)? {

@@ -24,6 +24,7 @@ pub mod exports;
 mod grids;
 mod ingest;
 mod jobs;
+pub mod labels;
 pub mod localisations;
 pub mod maps;
 pub mod matches;
@@ -41,6 +42,7 @@ mod series;
 mod site;
 mod trajectory;
 mod translation;
+pub mod word_queries;
 
 pub use error::AppError;
 pub use ingest::NewBatch;

@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
@@ -44,14 +45,17 @@ pub fn run(arguments: ServeArguments) -> anyhow::Result<()> {
     }
     start_logging(&config.log)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    runtime.block_on(async {
+    let outcome = runtime.block_on(async {
         let server = start_server(config).await?;
         // Scripts that start the server on port 0 read the address here.
         println!("listening on {}", server.url());
         until_interrupted().await?;
         tracing::info!("stopping");
         Ok(server.shutdown().await?)
-    })
+    });
+    // A build that is under way would hold up the exit; it is begun anew at the next start.
+    runtime.shutdown_timeout(Duration::from_secs(2));
+    outcome
 }
 
 /// Logs go to standard error, so that standard output stays for answers.

@@ -63,10 +63,14 @@ pub(super) async fn run(arguments: &LabelsArguments) -> Result<()> {
         .iter()
         .zip(&predicted)
         .map(|(run, labels)| {
-            let observation = |((travel_m, actual), label): (&(f64, Option<String>), &PlaceLabel)| {
-                LabelledObservation { travel_m: *travel_m, actual: actual.as_deref(), predicted: Some(label.name()) }
-            };
-            run.truth.iter().zip(labels).map(observation).collect()
+            let labelled = run.truth.iter().zip(labels);
+            labelled
+                .map(|((travel_m, actual), label)| LabelledObservation {
+                    travel_m: *travel_m,
+                    actual: actual.as_deref(),
+                    predicted: Some(label.name()),
+                })
+                .collect()
         })
         .collect();
     let report = judge_labels(&judged);
@@ -86,8 +90,8 @@ async fn mapped_run(
     let name = &sent.recording.name;
     let observations = client.observations(SITE, name).await?;
     let trajectory = client.trajectory(SITE, name, "map").await?;
-    let places: LabelledPlaces = serde_json::from_str(&read_text(labels_path)?)
-        .with_context(|| labels_path.display().to_string())?;
+    let places: LabelledPlaces =
+        serde_json::from_str(&read_text(labels_path)?).with_context(|| labels_path.display().to_string())?;
     let judged = judged_run(&sent.recording, &observations, &read_truth(truth_path)?, 0);
     let label_of = |pose: Option<Pose2>| places.label_at(&pose?.position()).map(str::to_owned);
     Ok(MappedRun {

@@ -79,7 +79,10 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
     let server = LocalServer::start().await?;
     let mapped = build(&server, &map).await?;
     let starts = starts(&log, &mapped, arguments);
-    ensure!(!starts.is_empty(), "no scan of the log lies within {MAPPED_M} m of the map with enough driving after it");
+    ensure!(
+        !starts.is_empty(),
+        "no scan of the log lies within {MAPPED_M} m of the map with enough driving after it"
+    );
     let style = ProgressStyle::with_template("{prefix} {bar:32.cyan/white} {pos:>4}/{len}  {msg}")?;
     let bar = ProgressBar::new(starts.len() as u64).with_style(style).with_prefix("localising");
     let mut trials = Vec::new();

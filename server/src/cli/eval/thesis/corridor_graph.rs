@@ -30,7 +30,9 @@ impl CorridorGraph {
         let mut waypoints: Vec<Point2> = Vec::new();
         let mut here: Option<Point2> = None;
         for (idx, corridor) in corridors.iter().enumerate() {
-            let (Some(&first), Some(&last)) = (corridor.points.first(), corridor.points.last()) else { continue };
+            let (Some(&first), Some(&last)) = (corridor.points.first(), corridor.points.last()) else {
+                continue;
+            };
             let next = corridors.get(idx + 1);
             let leads_on = |end: &Point2| next.is_none_or(|next| near_an_end(next, end));
             // Entered at the junction where the last corridor was left, or such that the next one can be reached.

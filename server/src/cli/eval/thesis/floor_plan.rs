@@ -29,8 +29,10 @@ impl FloorPlan {
         let cell = |value: f64, origin: f64, size: usize| {
             ((value - origin) / RESOLUTION_M).round().clamp(0.0, size as f64) as usize
         };
-        let columns = cell(from.x.min(to.x), self.origin.x, self.width)..cell(from.x.max(to.x), self.origin.x, self.width);
-        let rows = cell(from.y.min(to.y), self.origin.y, self.height)..cell(from.y.max(to.y), self.origin.y, self.height);
+        let columns = cell(from.x.min(to.x), self.origin.x, self.width)
+            ..cell(from.x.max(to.x), self.origin.x, self.width);
+        let rows = cell(from.y.min(to.y), self.origin.y, self.height)
+            ..cell(from.y.max(to.y), self.origin.y, self.height);
         for row in rows {
             self.is_free[row * self.width + columns.start..row * self.width + columns.end].fill(true);
         }

@@ -92,16 +92,20 @@ fn bucket(point: &Point2) -> Option<(usize, usize)> {
 ///
 /// # Errors
 /// A configuration that cannot work.
-pub(super) fn icp_curve(scenario: &Scenario, texts: &Texts, config: &TranslatorConfig) -> Result<Vec<CurvePoint>> {
+pub(super) fn icp_curve(
+    scenario: &Scenario,
+    texts: &Texts,
+    config: &TranslatorConfig,
+) -> Result<Vec<CurvePoint>> {
     let submaps = submaps_of(scenario, texts, config)?;
     let matches: Vec<JudgedMatch> = (0..submaps.len())
         .into_par_iter()
         .flat_map_iter(|later_idx| {
             let later = &submaps[later_idx];
             let submaps = &submaps;
-            let earlier = submaps[..later_idx].iter().filter(move |earlier| {
-                earlier.run != later.run || later.travel_m - earlier.travel_m >= 10.0
-            });
+            let earlier = submaps[..later_idx]
+                .iter()
+                .filter(move |earlier| earlier.run != later.run || later.travel_m - earlier.travel_m >= 10.0);
             earlier.filter_map(move |earlier| claim(earlier, later))
         })
         .collect();

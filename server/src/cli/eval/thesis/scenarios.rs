@@ -41,7 +41,12 @@ fn pioneer(num_people: usize) -> SimulationConfig {
     config
 }
 
-fn drive(world: &World, routes: &[Vec<Point2>], config: &SimulationConfig, seed: u64) -> Result<Vec<SimulatedRun>> {
+fn drive(
+    world: &World,
+    routes: &[Vec<Point2>],
+    config: &SimulationConfig,
+    seed: u64,
+) -> Result<Vec<SimulatedRun>> {
     let numbered = routes.iter().enumerate();
     numbered
         .map(|(idx, route)| Ok(simulate_run(world, &Task::Route(route.clone()), config, seed + idx as u64)?))
@@ -111,15 +116,25 @@ pub(super) fn two_loops() -> Result<Scenario> {
             corridor('C', &[(39.0, 9.0), (39.0, 0.0), (12.0, 0.0)], 1.8),
         ],
     };
-    let routes = ["DEBCEA DEBCEA DEBC", "DEBCEA DEBCEA DEBCEA DEBC", "DEBCEA DEBCEA DEBCEA DEBCEA D", "DEADEB CEBCEA DEADE"];
+    let routes = [
+        "DEBCEA DEBCEA DEBC",
+        "DEBCEA DEBCEA DEBCEA DEBC",
+        "DEBCEA DEBCEA DEBCEA DEBCEA D",
+        "DEADEB CEBCEA DEADE",
+    ];
     let routes = routes.iter().map(|route| graph.waypoints(route)).collect::<Result<Vec<_>>>()?;
     let world = floor(&graph, (39.0, 18.0))?;
     // The real one: a few people walk by.
-    Ok(Scenario { name: "C", what: "two adjacent loops of 60 and 90 m, four runs", runs: drive(&world, &routes, &pioneer(1), 403)? })
+    Ok(Scenario {
+        name: "C",
+        what: "two adjacent loops of 60 and 90 m, four runs",
+        runs: drive(&world, &routes, &pioneer(1), 403)?,
+    })
 }
 
 /// Share of the 40 laps under each of the twelve configurations (Figure 5.7).
-const CONFIGURATION_SHARES: [f64; 12] = [0.214, 0.071, 0.024, 0.012, 0.107, 0.048, 0.096, 0.214, 0.071, 0.024, 0.012, 0.107];
+const CONFIGURATION_SHARES: [f64; 12] =
+    [0.214, 0.071, 0.024, 0.012, 0.107, 0.048, 0.096, 0.214, 0.071, 0.024, 0.012, 0.107];
 const NUM_LAPS: f64 = 40.0;
 const LAP_M: f64 = 120.0;
 
@@ -130,11 +145,22 @@ const MANY_DOORS: [usize; 12] = [0, 3, 4, 5, 6, 7, 0, 0, 3, 4, 5, 6];
 
 /// Rooms along the corridors: the place of the door, and the direction in which the room lies.
 const ROOMS: [((f64, f64), (f64, f64)); 16] = [
-    ((6.0, 20.0), (0.0, 1.0)), ((13.0, 20.0), (0.0, -1.0)), ((27.0, 20.0), (0.0, 1.0)), ((34.0, 20.0), (0.0, -1.0)),
-    ((40.0, 15.0), (1.0, 0.0)), ((40.0, 8.0), (-1.0, 0.0)), ((40.0, 3.2), (1.0, 0.0)),
-    ((33.0, 0.0), (0.0, -1.0)), ((26.0, 0.0), (0.0, 1.0)), ((14.0, 0.0), (0.0, -1.0)), ((7.0, 0.0), (0.0, 1.0)),
-    ((0.0, 5.0), (-1.0, 0.0)), ((0.0, 12.0), (1.0, 0.0)), ((0.0, 17.0), (-1.0, 0.0)),
-    ((3.2, 20.0), (0.0, 1.0)), ((36.8, 0.0), (0.0, -1.0)),
+    ((6.0, 20.0), (0.0, 1.0)),
+    ((13.0, 20.0), (0.0, -1.0)),
+    ((27.0, 20.0), (0.0, 1.0)),
+    ((34.0, 20.0), (0.0, -1.0)),
+    ((40.0, 15.0), (1.0, 0.0)),
+    ((40.0, 8.0), (-1.0, 0.0)),
+    ((40.0, 3.2), (1.0, 0.0)),
+    ((33.0, 0.0), (0.0, -1.0)),
+    ((26.0, 0.0), (0.0, 1.0)),
+    ((14.0, 0.0), (0.0, -1.0)),
+    ((7.0, 0.0), (0.0, 1.0)),
+    ((0.0, 5.0), (-1.0, 0.0)),
+    ((0.0, 12.0), (1.0, 0.0)),
+    ((0.0, 17.0), (-1.0, 0.0)),
+    ((3.2, 20.0), (0.0, 1.0)),
+    ((36.8, 0.0), (0.0, -1.0)),
 ];
 
 /// Open rooms of each configuration: none; one a corridor, twice (scenario B); several a corridor or near corners
@@ -184,7 +210,8 @@ fn circuit(open_rooms: &[usize]) -> Result<World> {
     for &room in open_rooms {
         let ((x, y), (dx, dy)) = ROOMS[room];
         // Half the corridor's width to the door, a wall of 0.2 m, a door of 0.9 m and a room of 4 × 5 m behind it.
-        let along = |out_m: f64, side_m: f64| Point2::new(x + out_m * dx + side_m * dy, y + out_m * dy + side_m * dx);
+        let along =
+            |out_m: f64, side_m: f64| Point2::new(x + out_m * dx + side_m * dy, y + out_m * dy + side_m * dx);
         plan.cut(along(1.0, -0.45), along(1.4, 0.45));
         plan.cut(along(1.3, -2.0), along(6.3, 2.0));
     }

@@ -56,7 +56,10 @@ pub(super) fn translate(scenario: &Scenario, config: &TranslatorConfig) -> Resul
         let odometry: Vec<OdometryPose> = run
             .scans
             .iter()
-            .map(|scan| OdometryPose { timestamp_ns: scan.timestamp_ns, odom_from_robot: scan.odom_from_robot })
+            .map(|scan| OdometryPose {
+                timestamp_ns: scan.timestamp_ns,
+                odom_from_robot: scan.odom_from_robot,
+            })
             .collect();
         let joined = join_truth(&odometry, &run.truth);
         let visit = |observation: &Observation| Visit {
@@ -86,8 +89,7 @@ pub(super) fn chains_of(texts: &Texts, config: &MatchingConfig) -> (Vec<FoundCha
     let mut found = Vec::new();
     for (later_run, later) in texts.lattices.iter().enumerate() {
         for (earlier_run, earlier) in texts.lattices[..=later_run].iter().enumerate() {
-            let relation =
-                if earlier_run == later_run { Relation::SameRun } else { Relation::DifferentRuns };
+            let relation = if earlier_run == later_run { Relation::SameRun } else { Relation::DifferentRuns };
             let chains = find_chains(earlier, later, relation, config);
             let same_way = chains.into_iter().filter(|chain| chain.direction == Direction::Same);
             found.extend(same_way.map(|chain| FoundChain {
