@@ -7,6 +7,7 @@ use super::candidates::profile_candidates;
 use super::claims::{ClosureIndex, spatial_match};
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
+use super::decisions::{is_vetoed, mark_vetoed};
 use super::guided::guided_closures;
 use super::joining::{Hypothesis, hypotheses, judge_join, registered_candidates};
 use super::memo::RegistrationMemo;
@@ -25,7 +26,7 @@ use crate::pose_graph::PoseGraphError;
 pub fn map_site(
     config: &MappingConfig,
     runs: &[RunRecord<'_>],
-    _decisions: &[Decision],
+    decisions: &[Decision],
     memo: &mut RegistrationMemo,
 ) -> Result<SiteMap, PoseGraphError> {
     memo.prepare(&config.submap);
@@ -33,7 +34,7 @@ pub fn map_site(
     if set.anchors.is_empty() {
         return Ok(SiteMap::default());
     }
-    let mut mapper = Mapper::new(config, runs, &set)?;
+    let mut mapper = Mapper::new(config, runs, decisions, &set)?;
     mapper.settle(memo)?;
     if runs.len() > 1 {
         mapper.join(memo)?;
@@ -45,6 +46,7 @@ pub fn map_site(
 struct Mapper<'a> {
     config: &'a MappingConfig,
     runs: &'a [RunRecord<'a>],
+    decisions: &'a [Decision],
     set: &'a AnchorSet,
     components: Vec<u32>,
     graph: CoarseGraph,
@@ -56,18 +58,20 @@ impl<'a> Mapper<'a> {
     fn new(
         config: &'a MappingConfig,
         runs: &'a [RunRecord<'a>],
+        decisions: &'a [Decision],
         set: &'a AnchorSet,
     ) -> Result<Self, PoseGraphError> {
         let mut graph = CoarseGraph::new(set, runs, config);
         graph.optimise(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
-        Ok(Self { config, runs, set, components, graph, closures: Vec::new(), tried: Vec::new() })
+        Ok(Self { config, runs, decisions, set, components, graph, closures: Vec::new(), tried: Vec::new() })
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
     fn settle(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
         for _round in 0..self.config.max_rounds {
-            let round = guided_closures(self.set, &self.graph, &self.components, self.config, memo)?;
+            let mut round = guided_closures(self.set, &self.graph, &self.components, self.config, memo)?;
+            round.closures.retain(|closure| !is_vetoed(closure, self.decisions, self.set, self.runs));
             let kept = self.graph.optimise(self.set, &round.closures, self.config)?;
             let found: Vec<Closure> = round
                 .closures
@@ -98,8 +102,11 @@ impl<'a> Mapper<'a> {
                 self.set.anchors[candidate.earlier].run_idx != self.set.anchors[candidate.later].run_idx
             })
             .collect();
-        let registered: Vec<Closure> =
-            registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
+        let registered: Vec<Closure> = registered_candidates(&across, self.set, self.config, memo)
+            .into_iter()
+            .flatten()
+            .filter(|closure| !is_vetoed(closure, self.decisions, self.set, self.runs))
+            .collect();
         if std::env::var("V").is_ok() {
             eprintln!("join: candidates {} registered {}", across.len(), registered.len());
         }
@@ -180,10 +187,11 @@ impl<'a> Mapper<'a> {
         };
         let index: ClosureIndex<'_> =
             self.closures.iter().map(|closure| ((closure.earlier, closure.later), closure)).collect();
-        let matches = find_stretches(self.runs, &poses, &components, &settings)
+        let mut matches: Vec<_> = find_stretches(self.runs, &poses, &components, &settings)
             .iter()
             .map(|stretch| spatial_match(stretch, self.runs, self.set, &self.graph, &index, self.config))
             .collect();
+        mark_vetoed(&mut matches, self.decisions);
         let num_components = components.iter().max().map_or(0, |last| last + 1);
         SiteMap { matches, runs, num_components }
     }

@@ -5,6 +5,7 @@ mod candidates;
 mod claims;
 mod coarse_graph;
 mod config;
+mod decisions;
 mod guided;
 mod joining;
 mod mapper;
