@@ -7,6 +7,7 @@ mod coarse_graph;
 mod config;
 mod guided;
 mod joining;
+mod judgements;
 mod mapper;
 mod memo;
 mod place_match;
