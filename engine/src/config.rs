@@ -5,9 +5,10 @@ use thiserror::Error;
 
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
+use crate::localization::LocalizationConfig;
+use crate::mapping::MappingConfig;
 use crate::matching::MatchingConfig;
-use crate::registration::RegistrationConfig;
-use crate::retrieval::RetrievalConfig;
+use crate::registration::RefinerConfig;
 use crate::sampling::SamplingConfig;
 use crate::text::{QuantizerConfig, TextConfig};
 
@@ -36,10 +37,10 @@ pub struct EngineConfig {
     pub translator: TranslatorConfig,
     /// When stretches of text match.
     pub matching: MatchingConfig,
-    /// How scans and submaps are registered.
-    pub registration: RegistrationConfig,
-    /// How places are retrieved by their density profiles.
-    pub retrieval: RetrievalConfig,
+    /// How runs become one map.
+    pub mapping: MappingConfig,
+    /// How robots are found in the map.
+    pub localization: LocalizationConfig,
 }
 
 impl EngineConfig {
@@ -50,16 +51,31 @@ impl EngineConfig {
     pub fn validate(&self) -> Result<(), ConfigError> {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
-        self.registration.validate("registration")?;
-        self.retrieval.validate("retrieval")?;
+        self.mapping.validate("mapping")?;
+        self.localization.validate("localization")?;
         Ok(())
     }
+}
+
+/// Where the poses of scans come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OdometrySource {
+    /// Odometry refined by registering scans against the recent ones (SPEC section 4).
+    #[default]
+    Refined,
+    /// Odometry as sent, as the thesis uses it.
+    Raw,
 }
 
 /// All that decides how scans become a text (SPEC section 3).
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct TranslatorConfig {
+    /// Where the poses of scans come from.
+    pub odometry: OdometrySource,
+    /// How odometry is refined.
+    pub refiner: RefinerConfig,
     /// The rolling occupancy grid.
     pub local_map: LocalMapConfig,
     /// Kernels of the density.
@@ -78,6 +94,7 @@ impl TranslatorConfig {
     /// # Errors
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
+        self.refiner.validate(&format!("{path}.refiner"))?;
         self.local_map.validate(&format!("{path}.local_map"))?;
         self.density.validate(&format!("{path}.density"))?;
         self.sampling.validate(&format!("{path}.sampling"))?;

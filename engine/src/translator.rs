@@ -2,10 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, TranslatorConfig};
+use crate::config::{ConfigError, OdometrySource, TranslatorConfig};
 use crate::density::DensityEstimator;
 use crate::geometry::Pose2;
 use crate::grid::{Cell, LocalMap};
+use crate::registration::OdometryRefiner;
 use crate::sampling::{KeyframePose, KeyframeSampler, Place, PlaceSampler};
 use crate::scan::{Scan, ScanGeometry};
 use crate::text::{Observation, Quantizer, TextBuilder, Word};
@@ -35,8 +36,38 @@ pub struct Translator {
     local_map: LocalMap,
     density: DensityEstimator,
     places: PlaceSampler,
-    keyframes: KeyframeSampler,
+    geometry: ScanGeometry,
+    odometry: Odometry,
     text: TextBuilder,
+}
+
+/// What turns odometry into poses and chooses the keyframes.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+enum Odometry {
+    /// As sent.
+    Raw(KeyframeSampler),
+    /// Registered against the recent scans.
+    Refined(Box<OdometryRefiner>),
+}
+
+impl Odometry {
+    fn new(config: &TranslatorConfig) -> Self {
+        match config.odometry {
+            OdometrySource::Raw => Self::Raw(KeyframeSampler::new(&config.sampling)),
+            OdometrySource::Refined => Self::Refined(Box::new(OdometryRefiner::new(&config.refiner))),
+        }
+    }
+
+    /// Pose of the next scan in the run's frame and, if it is a keyframe, the covariance of the motion since the last.
+    fn pose(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<[[f64; 3]; 3]>) {
+        match self {
+            Self::Raw(keyframes) => (scan.odom_from_robot, keyframes.drive(&scan.odom_from_robot)),
+            Self::Refined(refiner) => {
+                let refined = refiner.refine(geometry, scan);
+                (refined.run_from_robot, refined.keyframe.map(|motion| motion.motion_covariance))
+            }
+        }
+    }
 }
 
 impl Translator {
@@ -65,8 +96,9 @@ impl Translator {
             local_map: LocalMap::new(&config.local_map, &geometry),
             density: DensityEstimator::new(&config.density, config.local_map.resolution_m),
             places: PlaceSampler::new(&config.sampling),
-            keyframes: KeyframeSampler::new(&config.sampling),
+            odometry: Odometry::new(config),
             text: TextBuilder::new(quantizer, &config.text),
+            geometry,
             config: config.clone(),
         })
     }
@@ -75,9 +107,16 @@ impl Translator {
     pub fn push(&mut self, scan: &Scan) -> Translation {
         let scan_seq = self.next_scan_seq;
         self.next_scan_seq += 1;
-        // Pose: odometry as sent.
-        self.run_from_robot = scan.odom_from_robot;
-        let keyframe = self.keyframe(scan_seq, scan);
+        // Pose: odometry as sent, or refined against the recent scans.
+        let (run_from_robot, motion_covariance) = self.odometry.pose(&self.geometry, scan);
+        self.run_from_robot = run_from_robot;
+        let keyframe = motion_covariance.map(|motion_covariance| KeyframePose {
+            scan_seq,
+            timestamp_ns: scan.timestamp_ns,
+            odom_from_robot: scan.odom_from_robot,
+            run_from_robot,
+            motion_covariance,
+        });
         // Local map.
         self.local_map.integrate_scan(&scan.ranges_m, &self.run_from_robot);
         // Density and frontiers make an observation, of the places that lie the delay behind.
@@ -122,17 +161,6 @@ impl Translator {
     /// The local map as of the last scan.
     pub fn local_map(&self) -> &LocalMap {
         &self.local_map
-    }
-
-    fn keyframe(&mut self, scan_seq: u64, scan: &Scan) -> Option<KeyframePose> {
-        let motion_covariance = self.keyframes.drive(&scan.odom_from_robot)?;
-        Some(KeyframePose {
-            scan_seq,
-            timestamp_ns: scan.timestamp_ns,
-            odom_from_robot: scan.odom_from_robot,
-            run_from_robot: self.run_from_robot,
-            motion_covariance,
-        })
     }
 
     fn observe(&self, place: Place) -> Observation {
@@ -185,7 +213,8 @@ struct SavedTranslator {
     run_from_robot: Pose2,
     local_map: LocalMap,
     places: PlaceSampler,
-    keyframes: KeyframeSampler,
+    geometry: ScanGeometry,
+    odometry: Odometry,
     text: TextBuilder,
 }
 
@@ -198,10 +227,11 @@ impl From<Translator> for SavedTranslator {
             local_map,
             density: _,
             places,
-            keyframes,
+            geometry,
+            odometry,
             text,
         } = translator;
-        Self { config, next_scan_seq, run_from_robot, local_map, places, keyframes, text }
+        Self { config, next_scan_seq, run_from_robot, local_map, places, geometry, odometry, text }
     }
 }
 
@@ -209,10 +239,28 @@ impl TryFrom<SavedTranslator> for Translator {
     type Error = ConfigError;
 
     fn try_from(saved: SavedTranslator) -> Result<Self, ConfigError> {
-        let SavedTranslator { config, next_scan_seq, run_from_robot, local_map, places, keyframes, text } =
-            saved;
+        let SavedTranslator {
+            config,
+            next_scan_seq,
+            run_from_robot,
+            local_map,
+            places,
+            geometry,
+            odometry,
+            text,
+        } = saved;
         config.validate("translator")?;
         let density = DensityEstimator::new(&config.density, config.local_map.resolution_m);
-        Ok(Self { config, next_scan_seq, run_from_robot, local_map, density, places, keyframes, text })
+        Ok(Self {
+            config,
+            next_scan_seq,
+            run_from_robot,
+            local_map,
+            density,
+            places,
+            geometry,
+            odometry,
+            text,
+        })
     }
 }

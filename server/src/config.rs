@@ -79,7 +79,7 @@ impl Default for LimitsConfig {
             num_runs_per_site_max: 10_000,
             odometry_step_max_m: 5.0,
             num_requests_max: 512,
-            num_batches_max: 64,
+            num_batches_max: 32,
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localisations_max: 32,
@@ -195,7 +195,7 @@ impl ServerConfig {
             figment = figment.merge(Toml::file_exact(file));
         }
         let config: ServerConfig = figment
-            .merge(Env::prefixed("LOCUTION_").ignore(&["datasets", "golden", "key", "url"]).split("__"))
+            .merge(environment())
             .merge(Serialized::defaults(flags))
             .extract()
             .map_err(|error| ServerConfigError::Unreadable(Box::new(error)))?;
@@ -250,6 +250,16 @@ impl ServerConfig {
         }
         Ok(())
     }
+}
+
+/// Variables that begin with the name of a field. Others of the prefix belong to other tools, such as the tests.
+fn environment() -> Env {
+    const FIELDS: [&str; 7] = ["address", "data_directory", "limits", "storage", "builds", "log", "keys"];
+    let is_ours = |key: &figment::value::UncasedStr| {
+        let key = key.as_str().to_ascii_lowercase();
+        FIELDS.iter().any(|field| key == *field || key.starts_with(&format!("{field}__")))
+    };
+    Env::prefixed("LOCUTION_").filter(is_ours).split("__")
 }
 
 #[cfg(test)]

@@ -10,6 +10,7 @@
 use std::net::SocketAddr;
 use std::sync::{Arc, OnceLock};
 
+use axum::serve::ListenerExt;
 use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use thiserror::Error;
 use tokio::net::TcpListener;
@@ -25,6 +26,7 @@ pub mod error;
 pub mod extract;
 pub mod handlers;
 pub mod openapi;
+pub mod picture;
 pub mod router;
 pub mod state;
 pub mod storage;
@@ -102,6 +104,7 @@ pub async fn start_server(config: ServerConfig) -> Result<RunningServer, StartEr
     let listener = TcpListener::bind(config.address).await.map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
     let app = Arc::new(App::new(config.clone(), Arc::new(storage)));
+    app.resume().await?;
     let state = AppState {
         app: Arc::clone(&app),
         keys: Arc::new(auth::Keys::new(&config.keys)),
@@ -109,6 +112,10 @@ pub async fn start_server(config: ServerConfig) -> Result<RunningServer, StartEr
     };
     let (stop, mut stopped) = watch::channel(false);
     let service = router::build_router(state);
+    // Small answers must not wait for the acknowledgement of the ones before.
+    let listener = listener.tap_io(|stream| {
+        let _ = stream.set_nodelay(true);
+    });
     let serving = tokio::spawn(async move {
         let until_stopped = async move {
             let _ = stopped.wait_for(|is_stopped| *is_stopped).await;

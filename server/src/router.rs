@@ -20,7 +20,9 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::auth;
 use crate::error::ApiError;
-use crate::handlers::{batches, operations, runs, sites, texts};
+use crate::handlers::{
+    batches, jobs, labels, localisations, maps, matches, operations, queries, runs, sites, texts,
+};
 use crate::openapi::{self, Document};
 use crate::state::AppState;
 
@@ -30,6 +32,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(operations::healthz))
         .routes(routes!(operations::readyz))
         .routes(routes!(operations::metrics))
+        .routes(routes!(operations::ui))
         .routes(routes!(sites::list_sites))
         .routes(routes!(sites::make_site, sites::get_site, sites::delete_site))
         .routes(routes!(runs::list_runs))
@@ -41,6 +44,29 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(texts::list_words))
         .routes(routes!(texts::get_trajectory))
         .routes(routes!(texts::get_trajectory_tum))
+        .routes(routes!(jobs::build_map))
+        .routes(routes!(jobs::list_jobs))
+        .routes(routes!(jobs::get_job))
+        .routes(routes!(matches::list_matches))
+        .routes(routes!(matches::get_match))
+        .routes(routes!(matches::decide_match, matches::undecide_match))
+        .routes(routes!(maps::get_map))
+        .routes(routes!(maps::get_grid))
+        .routes(routes!(maps::get_grid_pgm))
+        .routes(routes!(maps::get_grid_png))
+        .routes(routes!(maps::get_grid_yaml))
+        .routes(routes!(maps::get_graph_g2o))
+        .routes(routes!(maps::get_map_tum))
+        .routes(routes!(maps::get_picture_png))
+        .routes(routes!(maps::get_picture_svg))
+        .routes(routes!(localisations::open_localisation))
+        .routes(routes!(localisations::get_localisation, localisations::close_localisation))
+        .routes(routes!(localisations::localise))
+        .routes(routes!(localisations::query_example))
+        .routes(routes!(queries::query_words))
+        .routes(routes!(labels::list_labels))
+        .routes(routes!(labels::query_labels))
+        .routes(routes!(localisations::query_example_everywhere))
 }
 
 /// The service: routes, documentation, limits, keys.

@@ -3,6 +3,8 @@
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
 use locution_tests::{Api, drive};
@@ -11,7 +13,7 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 const NUM_KILLS: usize = 20;
-const NUM_SCANS_PER_BATCH: usize = 40;
+const NUM_SCANS_PER_BATCH: usize = 20;
 
 /// A server process; killed when dropped.
 struct Process {
@@ -25,6 +27,7 @@ impl Process {
             .args(["serve", "--address", "127.0.0.1:0", "--data-directory"])
             .arg(directory)
             .env("LOCUTION_STORAGE__NUM_SCANS_PER_CHECKPOINT", "150")
+            .env_remove("LOCUTION_BIN")
             .env("LOCUTION_BUILDS__IS_AUTOMATIC", "false")
             .env("LOCUTION_LOG__FILTER", "error")
             .stdout(Stdio::piped())
@@ -68,13 +71,14 @@ async fn post(api: &Api, first: usize, scans: &[Value]) -> Option<Value> {
 }
 
 /// Posts from where the server stands until it dies or all is sent; the highest acknowledged number.
-async fn post_until_killed(api: &Api, scans: &[Value], from: usize) -> usize {
+async fn post_until_killed(api: &Api, scans: &[Value], from: usize, acknowledged: &AtomicUsize) -> usize {
     let mut next = from;
     while next < scans.len() {
         let end = scans.len().min(next + NUM_SCANS_PER_BATCH);
         let Some(receipt) = post(api, next, &scans[next..end]).await else { break };
         next = receipt["next_sequence"].as_u64().unwrap() as usize;
         assert_eq!(next, end);
+        acknowledged.store(next, Ordering::Release);
     }
     next
 }
@@ -94,7 +98,7 @@ async fn everything(api: &Api) -> Vec<String> {
 #[tokio::test(flavor = "multi_thread")]
 async fn twenty_kills_lose_nothing_and_change_no_byte() {
     let binary = binary();
-    let scans = drive(12_000, 11);
+    let scans = drive(6_000, 11);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     let directory = tempfile::tempdir().unwrap();
     let mut process = Process::start(&binary, directory.path());
@@ -104,8 +108,15 @@ async fn twenty_kills_lose_nothing_and_change_no_byte() {
     while num_kills < NUM_KILLS {
         let (api, to_send) = (process.api.clone(), scans.clone());
         let from = num_acknowledged;
-        let client = tokio::spawn(async move { post_until_killed(&api, &to_send, from).await });
-        tokio::time::sleep(Duration::from_micros(rng.random_range(1_000..150_000))).await;
+        let acknowledged = Arc::new(AtomicUsize::new(from));
+        let shared = Arc::clone(&acknowledged);
+        let client = tokio::spawn(async move { post_until_killed(&api, &to_send, from, &shared).await });
+        // A random number of batches and then a random part of one, so that a slow machine is hit as evenly.
+        let target = scans.len().min(from + NUM_SCANS_PER_BATCH * rng.random_range(0..20));
+        while acknowledged.load(Ordering::Acquire) < target && !client.is_finished() {
+            tokio::time::sleep(Duration::from_micros(200)).await;
+        }
+        tokio::time::sleep(Duration::from_micros(rng.random_range(0..15_000))).await;
         process.kill();
         num_kills += 1;
         num_acknowledged = client.await.unwrap();
@@ -122,7 +133,10 @@ async fn twenty_kills_lose_nothing_and_change_no_byte() {
     }
     println!("{num_kills} kills, the last one after {num_acknowledged} of {} scans", scans.len());
     assert_eq!(num_kills, NUM_KILLS, "the recording was too short to be interrupted often enough");
-    assert_eq!(post_until_killed(&process.api, &scans, num_acknowledged).await, scans.len());
+    assert_eq!(
+        post_until_killed(&process.api, &scans, num_acknowledged, &AtomicUsize::new(0)).await,
+        scans.len()
+    );
     process.api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
     let interrupted = everything(&process.api).await;
     process.kill();
@@ -130,7 +144,7 @@ async fn twenty_kills_lose_nothing_and_change_no_byte() {
     let fresh = tempfile::tempdir().unwrap();
     let undisturbed = Process::start(&binary, fresh.path());
     undisturbed.api.make_run("a", "r").await;
-    assert_eq!(post_until_killed(&undisturbed.api, &scans, 0).await, scans.len());
+    assert_eq!(post_until_killed(&undisturbed.api, &scans, 0, &AtomicUsize::new(0)).await, scans.len());
     undisturbed.api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
     for (interrupted, undisturbed) in interrupted.iter().zip(&everything(&undisturbed.api).await) {
         assert!(interrupted == undisturbed, "the texts differ");

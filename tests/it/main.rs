@@ -5,4 +5,5 @@ mod access;
 mod bad_input;
 mod batches;
 mod crash;
+mod maps;
 mod sites;

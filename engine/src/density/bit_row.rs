@@ -22,16 +22,8 @@ impl<const W: usize> BitRow<W> {
         self.0.iter().all(|&word| word == 0)
     }
 
-    pub fn has(&self, cell: usize) -> bool {
-        self.0[cell >> 6] >> (cell & 63) & 1 == 1
-    }
-
     pub fn insert(&mut self, cell: usize) {
         self.0[cell >> 6] |= 1 << (cell & 63);
-    }
-
-    pub fn remove(&mut self, cell: usize) {
-        self.0[cell >> 6] &= !(1 << (cell & 63));
     }
 
     pub fn and(&self, other: &Self) -> Self {

@@ -98,11 +98,10 @@ impl DensityEstimator {
         reached: &[BitRow<W>],
         support: &[BitRow<W>],
     ) -> bool {
-        let mut met: Vec<_> = (0..reached.len())
-            .map(|row| with_neighbors(reached, row).and(&window.unknown[row]).and(&support[row]))
-            .collect();
-        let num_met: u32 = met.iter().map(BitRow::count).sum();
-        f64::from(num_met) > self.min_opening_cells && count_groups(&mut met, self.min_opening_cells) > 0
+        let met = (0..reached.len())
+            .map(|row| with_neighbors(reached, row).and(&window.unknown[row]).and(&support[row]));
+        let num_met: u32 = met.clone().map(|row| row.count()).sum();
+        f64::from(num_met) > self.min_opening_cells && count_groups(met, self.min_opening_cells) > 0
     }
 
     /// Algorithm 6.1.
@@ -112,10 +111,9 @@ impl DensityEstimator {
         reached: &[BitRow<W>],
         support: &[BitRow<W>],
     ) -> u8 {
-        let mut border: Vec<_> = (0..reached.len())
-            .map(|row| with_neighbors(reached, row).and(&window.free[row]).and_not(&support[row]))
-            .collect();
-        count_groups(&mut border, self.min_frontier_cells).min(255) as u8
+        let border = (0..reached.len())
+            .map(|row| with_neighbors(reached, row).and(&window.free[row]).and_not(&support[row]));
+        count_groups(border, self.min_frontier_cells).min(255) as u8
     }
 }
 

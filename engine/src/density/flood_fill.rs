@@ -53,31 +53,70 @@ pub(super) fn with_neighbors<const W: usize>(reached: &[BitRow<W>], index: usize
 
 /// Number of groups of cells with more than `min_cells` members; cells of a group touch by edges or corners.
 ///
-/// A closed ring of border cells is connected only across corners, hence the eight-neighbourhood. Empties `rows`.
-pub(super) fn count_groups<const W: usize>(rows: &mut [BitRow<W>], min_cells: f64) -> usize {
-    let mut num_groups = 0;
-    let mut open = Vec::new();
-    for index in 0..rows.len() {
-        while !rows[index].is_empty() {
-            let word = rows[index].0.iter().position(|&word| word != 0).unwrap_or(0);
-            open.push((index, word * 64 + rows[index].0[word].trailing_zeros() as usize));
-            rows[index].remove(open[0].1);
-            let mut size = 0;
-            while let Some((row, cell)) = open.pop() {
-                size += 1;
-                for near_row in row.saturating_sub(1)..=(row + 1).min(rows.len() - 1) {
-                    for near_cell in cell.saturating_sub(1)..=(cell + 1).min(64 * W - 1) {
-                        if rows[near_row].has(near_cell) {
-                            rows[near_row].remove(near_cell);
-                            open.push((near_row, near_cell));
-                        }
-                    }
-                }
+/// A closed ring of border cells is connected only across corners, hence the eight-neighbourhood. Runs of cells are
+/// united with the runs they touch in the row before.
+pub(super) fn count_groups<const W: usize>(rows: impl Iterator<Item = BitRow<W>>, min_cells: f64) -> usize {
+    let mut groups = Groups::default();
+    let (mut previous, mut current): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
+    for row in rows {
+        current.clear();
+        let mut touching = 0;
+        row.for_each_run(|start, end| {
+            let group = groups.add(end - start);
+            // Runs of both rows come from left to right; what ends before this run touches no later one.
+            while touching < previous.len() && previous[touching].end < start {
+                touching += 1;
             }
-            if f64::from(size) > min_cells {
-                num_groups += 1;
+            for run in previous[touching..].iter().take_while(|run| run.start <= end) {
+                groups.unite(run.group, group);
             }
+            current.push(Run { start, end, group });
+        });
+        std::mem::swap(&mut previous, &mut current);
+    }
+    groups.count_larger_than(min_cells)
+}
+
+/// Cells `start..end` of a row.
+#[derive(Clone, Copy)]
+struct Run {
+    start: usize,
+    end: usize,
+    group: usize,
+}
+
+/// Disjoint sets with the number of cells in each.
+#[derive(Default)]
+struct Groups {
+    parents: Vec<usize>,
+    num_cells: Vec<usize>,
+}
+
+impl Groups {
+    fn add(&mut self, num_cells: usize) -> usize {
+        self.parents.push(self.parents.len());
+        self.num_cells.push(num_cells);
+        self.parents.len() - 1
+    }
+
+    fn root(&mut self, mut group: usize) -> usize {
+        while self.parents[group] != group {
+            self.parents[group] = self.parents[self.parents[group]];
+            group = self.parents[group];
+        }
+        group
+    }
+
+    fn unite(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        if a != b {
+            self.parents[b] = a;
+            self.num_cells[a] += self.num_cells[b];
         }
     }
-    num_groups
+
+    fn count_larger_than(&self, min_cells: f64) -> usize {
+        let roots = self.parents.iter().enumerate().filter(|(group, parent)| group == *parent);
+        roots.filter(|(group, _)| self.num_cells[*group] as f64 > min_cells).count()
+    }
 }

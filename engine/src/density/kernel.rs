@@ -20,6 +20,8 @@ pub(super) struct Kernel {
     /// For each row distance, sums of the weights of all cells left of a column, from the row's first.
     prefix_sums: Vec<Vec<u32>>,
     total: u64,
+    /// The weight of every cell, where it is one: then cells need only be counted.
+    uniform_weight: Option<u64>,
 }
 
 impl Kernel {
@@ -60,7 +62,9 @@ impl Kernel {
             .enumerate()
             .map(|(row, sums)| if row == 0 { 1 } else { 2 } * row_total(sums))
             .sum();
-        Self { bandwidth, half_widths, prefix_sums, total }
+        let is_uniform = config.profile == KernelProfile::Uniform;
+        let uniform_weight = is_uniform.then(|| prefix_sums.first().map_or(0, |sums| u64::from(sums[1])));
+        Self { bandwidth, half_widths, prefix_sums, total, uniform_weight }
     }
 
     /// Cells on the border of the support.
@@ -70,18 +74,23 @@ impl Kernel {
 
     /// Weighted share of the support that the rows cover; row `center` holds the kernel's centre at bit `center`.
     pub fn density<const W: usize>(&self, rows: &[BitRow<W>], center: usize) -> f32 {
-        let mut covered = 0u64;
-        for (dy, (half, sums)) in self.half_widths.iter().zip(&self.prefix_sums).enumerate() {
-            let first = center - *half as usize;
-            let mut add = |row: &BitRow<W>| {
-                row.for_each_run(|start, end| covered += u64::from(sums[end - first] - sums[start - first]));
-            };
-            add(&rows[center + dy]);
-            if dy > 0 {
-                add(&rows[center - dy]);
-            }
-        }
+        let covered: u64 = (0..self.half_widths.len())
+            .map(|dy| {
+                let below = if dy > 0 { self.row_sum(&rows[center - dy], dy, center) } else { 0 };
+                self.row_sum(&rows[center + dy], dy, center) + below
+            })
+            .sum();
         (covered as f64 / self.total as f64) as f32
+    }
+
+    fn row_sum<const W: usize>(&self, row: &BitRow<W>, dy: usize, center: usize) -> u64 {
+        if let Some(weight) = self.uniform_weight {
+            return u64::from(row.count()) * weight;
+        }
+        let (first, sums) = (center - self.half_widths[dy] as usize, &self.prefix_sums[dy]);
+        let mut sum = 0;
+        row.for_each_run(|start, end| sum += u64::from(sums[end - first] - sums[start - first]));
+        sum
     }
 }
 

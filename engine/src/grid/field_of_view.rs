@@ -7,7 +7,10 @@
 use std::f64::consts::TAU;
 
 /// Sectors of a quarter turn.
-pub(super) const SECTORS_PER_QUADRANT: usize = 256;
+pub(super) const SECTORS_PER_QUADRANT: usize = 64;
+
+/// Sectors of a full turn.
+pub(super) const NUM_SECTORS: usize = 4 * SECTORS_PER_QUADRANT;
 
 /// Angle between the edges of a sector, in 2⁻³² turns.
 pub(super) const SECTOR_WIDTH: u32 = 1 << (30 - SECTORS_PER_QUADRANT.ilog2());

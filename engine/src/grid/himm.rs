@@ -1,27 +1,28 @@
 //! The update rule of the local map (thesis Algorithm 2.2, SPEC 3.1).
+//!
+//! The cells that a scan frees and those it hits are collected as bits first and applied to 64 cells at a time. In a
+//! sector of the view that belongs to one beam, the freed cells are simply the nearest ones; only where beams meet is
+//! the beam of a cell looked up.
 
 use std::f64::consts::TAU;
 
-use super::field_of_view::{SECTOR_WIDTH, SECTORS_PER_QUADRANT, ViewCell, to_turns};
+use super::field_of_view::{NUM_SECTORS, SECTOR_WIDTH, SECTORS_PER_QUADRANT, ViewCell, to_turns};
+use super::local_map::for_each_word;
 use super::{Cell, LocalMap, LocalMapConfig};
 use crate::geometry::Pose2;
 use crate::scan::ScanGeometry;
 
 /// Squared distances, in cells, at which the cells of one beam change their meaning.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct BeamLimits {
+struct BeamLimits {
     /// Cells below this lie before the reading.
     free_end: u32,
     /// Cells from here...
     hit_begin: u32,
     /// ...and below this lie around it.
     hit_end: u32,
-}
-
-impl BeamLimits {
-    fn reach(&self) -> u32 {
-        self.free_end.max(self.hit_end)
-    }
+    /// Cells from here on are not touched.
+    reach: u32,
 }
 
 /// The laser with its beams in counter-clockwise order.
@@ -35,7 +36,7 @@ pub(super) struct Laser {
 }
 
 impl Laser {
-    pub fn new(geometry: &ScanGeometry, _config: &LocalMapConfig) -> Self {
+    pub fn new(geometry: &ScanGeometry) -> Self {
         let beams_per_turn = (TAU / geometry.angle_increment_rad.abs() * 65_536.0).round() as u64;
         let num_slots = (beams_per_turn >> 16) as usize + 2;
         let limits = vec![BeamLimits::default(); num_slots.max(geometry.num_ranges)];
@@ -58,42 +59,52 @@ impl Laser {
         ((u64::from(from_first_edge) * self.beams_per_turn) >> 48) as usize
     }
 
+    /// Sectors that the field of view touches, from the one that holds its first edge.
+    fn num_sectors(&self) -> usize {
+        let view = ((self.geometry.num_ranges as u64) << 48) / self.beams_per_turn;
+        ((view / u64::from(SECTOR_WIDTH)) as usize + 2).min(NUM_SECTORS)
+    }
+
     fn set_limits(&mut self, ranges_m: &[f32], config: &LocalMapConfig) {
-        let num_ranges = self.geometry.num_ranges;
+        let (num_ranges, radius) = (self.geometry.num_ranges, config.radius_cells());
         for beam in 0..num_ranges {
             let index = if self.geometry.angle_increment_rad > 0.0 { beam } else { num_ranges - 1 - beam };
             self.limits[beam] = ranges_m
                 .get(index)
-                .map(|&range_m| limits_of(range_m, &self.geometry, config))
+                .map(|&range_m| limits_of(range_m, radius, &self.geometry, config))
                 .unwrap_or_default();
         }
     }
 }
 
 /// What a reading says about the cells of its beam.
-fn limits_of(range_m: f32, geometry: &ScanGeometry, config: &LocalMapConfig) -> BeamLimits {
-    let radius = config.radius_cells();
-    let radius_end = (radius * radius).floor() as u32 + 1;
+fn limits_of(range_m: f32, radius: f64, geometry: &ScanGeometry, config: &LocalMapConfig) -> BeamLimits {
+    let radius_end = (radius * radius) as u32 + 1;
+    let free_up_to = |free_end: u32| BeamLimits { free_end, reach: free_end, ..BeamLimits::default() };
     if range_m <= 0.0 {
         // A reading of nothing is a fault of the sensor; it says neither free nor occupied.
         return BeamLimits::default();
     }
     if !geometry.is_return(range_m) {
         let cleared = geometry.range_max_m / config.resolution_m;
-        let free_end = if cleared > radius { radius_end } else { (cleared * cleared).ceil() as u32 };
-        return BeamLimits { free_end, ..BeamLimits::default() };
+        return free_up_to(if cleared > radius { radius_end } else { rounded_up(cleared * cleared) });
     }
     let range = f64::from(range_m) / config.resolution_m;
     let (near, far) = (range - config.hit_tolerance_cells, range + config.hit_tolerance_cells);
     if near > radius {
-        return BeamLimits { free_end: radius_end, ..BeamLimits::default() };
+        return free_up_to(radius_end);
     }
     let near_squared = near.max(0.0).powi(2);
-    BeamLimits {
-        free_end: near_squared.ceil() as u32,
-        hit_begin: if near < 0.0 { 0 } else { near_squared.floor() as u32 + 1 },
-        hit_end: (far * far).ceil().min((radius * radius).ceil()) as u32,
-    }
+    let free_end = rounded_up(near_squared);
+    let hit_end = rounded_up((far * far).min(radius * radius));
+    let hit_begin = if near < 0.0 { 0 } else { near_squared as u32 + 1 };
+    BeamLimits { free_end, hit_begin, hit_end, reach: free_end.max(hit_end) }
+}
+
+/// The smallest integer not below a number that is not negative.
+fn rounded_up(number: f64) -> u32 {
+    let below = number as u32;
+    below + u32::from(f64::from(below) < number)
 }
 
 impl LocalMap {
@@ -113,16 +124,16 @@ impl LocalMap {
             self.unmark_beyond_radius(laser, robot);
         }
         self.apply_seen();
-        for cell in self.cells_to_laser(map_from_robot, laser) {
+        for cell in cells_between(robot, laser) {
             self.stamp_footprint(cell);
         }
     }
 
     fn unmark_beyond_radius(&mut self, laser: Cell, robot: Cell) {
         for (start, len) in self.outside(laser, robot) {
-            super::local_map::for_each_word(start, len, self.index_mask(), |word, mask| {
-                self.seen_free[word] &= !mask;
-                self.seen_hit[word] &= !mask;
+            for_each_word(start, len, self.index_mask(), |word, mask| {
+                self.seen.free[word] &= !mask;
+                self.seen.hit[word] &= !mask;
             });
         }
     }
@@ -130,45 +141,122 @@ impl LocalMap {
     /// Collects the cells before and around the readings, seen from the laser's cell.
     fn mark_seen(&mut self, laser_cell: Cell, first_edge: u32) {
         let (base, index_mask, side) = (self.index(laser_cell) as i32, self.index_mask(), self.side());
-        let (laser, seen_free, seen_hit) = (&self.laser, &mut self.seen_free, &mut self.seen_hit);
         // A quarter turn maps (dx, dy) to (−dy, dx); on the helix a column counts 1 and a row counts `side`.
-        for (quadrant, (per_dx, per_dy)) in
-            [(1, side), (side, -1), (-1, -side), (-side, 1)].into_iter().enumerate()
+        let quarter_turns = [(1, side), (side, -1), (-1, -side), (-side, 1)];
+        let first_sector = (first_edge / SECTOR_WIDTH) as usize;
+        for sector in
+            (first_sector..first_sector + self.laser.num_sectors()).map(|sector| sector % NUM_SECTORS)
         {
-            let quadrant_angle = (quadrant as u32) << 30;
-            for sector in 0..SECTORS_PER_QUADRANT {
-                let from_edge = (quadrant_angle + sector as u32 * SECTOR_WIDTH).wrapping_sub(first_edge);
-                let (first_beam, last_beam) =
-                    (laser.beam_at(from_edge), laser.beam_at(from_edge.wrapping_add(SECTOR_WIDTH - 1)));
-                let reach = reach_of_beams(&laser.limits, first_beam, last_beam);
-                let mut mark = |cell: &ViewCell, limits: &BeamLimits| {
-                    let offset = i32::from(cell.dx) * per_dx + i32::from(cell.dy) * per_dy;
-                    let index = base.wrapping_add(offset) as usize & index_mask;
-                    let squared = u32::from(cell.squared);
-                    if squared < limits.free_end {
-                        seen_free[index >> 6] |= 1 << (index & 63);
-                    } else if squared >= limits.hit_begin && squared < limits.hit_end {
-                        seen_hit[index >> 6] |= 1 << (index & 63);
-                    }
-                };
-                for cell in self.view.sector(sector) {
-                    if u32::from(cell.squared) >= reach {
-                        break;
-                    }
-                    let from_edge = (quadrant_angle + cell.angle).wrapping_sub(first_edge);
-                    mark(cell, &laser.limits[laser.beam_at(from_edge)]);
-                }
+            let (quadrant, sector_of_quadrant) =
+                (sector / SECTORS_PER_QUADRANT, sector % SECTORS_PER_QUADRANT);
+            let (per_dx, per_dy) = quarter_turns[quadrant];
+            let bit_of = |cell: &ViewCell| {
+                base.wrapping_add(i32::from(cell.dx) * per_dx + i32::from(cell.dy) * per_dy) as usize
+                    & index_mask
+            };
+            let cells = self.view.sector(sector_of_quadrant);
+            let from_edge = (sector as u32).wrapping_mul(SECTOR_WIDTH).wrapping_sub(first_edge);
+            let beams =
+                (self.laser.beam_at(from_edge), self.laser.beam_at(from_edge.wrapping_add(SECTOR_WIDTH - 1)));
+            if beams.0 == beams.1 {
+                self.seen.mark_beam(cells, &self.laser.limits[beams.0], bit_of);
+            } else {
+                let turned = ((quadrant as u32) << 30).wrapping_sub(first_edge);
+                self.seen.mark_beams(cells, &self.laser, beams, turned, bit_of);
             }
         }
     }
 }
 
-/// The farthest reach of the beams that a sector touches; a sector may straddle the first edge.
-fn reach_of_beams(limits: &[BeamLimits], first: usize, last: usize) -> u32 {
-    let farthest = |beams: &[BeamLimits]| beams.iter().map(BeamLimits::reach).max().unwrap_or(0);
-    if first <= last {
-        farthest(&limits[first..=last])
-    } else {
-        farthest(&limits[first..]).max(farthest(&limits[..=last]))
+/// Cells that the scan at hand found free, and hit, as bits on the map's helix; empty between scans.
+#[derive(Clone, Debug)]
+pub(super) struct Seen {
+    pub free: Vec<u64>,
+    pub hit: Vec<u64>,
+}
+
+impl Seen {
+    pub fn new(num_words: usize) -> Self {
+        Self { free: vec![0; num_words], hit: vec![0; num_words] }
     }
+
+    /// Marks the cells of a sector that lies within one beam.
+    #[inline]
+    fn mark_beam(&mut self, cells: &[ViewCell], limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
+        let mut rest = cells.iter();
+        for cell in rest.by_ref() {
+            if u32::from(cell.squared) >= limits.free_end {
+                mark_hit(&mut self.hit, cell, limits, &bit_of);
+                break;
+            }
+            insert(&mut self.free, bit_of(cell));
+        }
+        for cell in rest {
+            if u32::from(cell.squared) >= limits.hit_end {
+                break;
+            }
+            mark_hit(&mut self.hit, cell, limits, &bit_of);
+        }
+    }
+
+    /// Marks the cells of a sector in which beams meet; `turned` leads from a cell's angle to that from the first edge.
+    #[inline]
+    fn mark_beams(
+        &mut self,
+        cells: &[ViewCell],
+        laser: &Laser,
+        (first, last): (usize, usize),
+        turned: u32,
+        bit_of: impl Fn(&ViewCell) -> usize,
+    ) {
+        let (free_for_all, reach) = common_limits(&laser.limits, first, last);
+        for cell in cells {
+            let squared = u32::from(cell.squared);
+            if squared < free_for_all {
+                insert(&mut self.free, bit_of(cell));
+                continue;
+            }
+            if squared >= reach {
+                break;
+            }
+            let limits = &laser.limits[laser.beam_at(cell.angle.wrapping_add(turned))];
+            if squared < limits.free_end {
+                insert(&mut self.free, bit_of(cell));
+            } else {
+                mark_hit(&mut self.hit, cell, limits, &bit_of);
+            }
+        }
+    }
+}
+
+fn insert(bits: &mut [u64], bit: usize) {
+    bits[bit >> 6] |= 1 << (bit & 63);
+}
+
+fn mark_hit(hit: &mut [u64], cell: &ViewCell, limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
+    if (limits.hit_begin..limits.hit_end).contains(&u32::from(cell.squared)) {
+        insert(hit, bit_of(cell));
+    }
+}
+
+/// What all beams of a sector free, and how far the farthest goes; a sector may straddle the first edge.
+fn common_limits(limits: &[BeamLimits], first: usize, last: usize) -> (u32, u32) {
+    let fold = |beams: &[BeamLimits], start: (u32, u32)| {
+        beams.iter().fold(start, |(free, reach), beam| (free.min(beam.free_end), reach.max(beam.reach)))
+    };
+    if first <= last {
+        fold(&limits[first..=last], (u32::MAX, 0))
+    } else {
+        fold(&limits[..=last], fold(&limits[first..], (u32::MAX, 0)))
+    }
+}
+
+/// Cells on the straight line between two, both included.
+fn cells_between(from: Cell, to: Cell) -> impl Iterator<Item = Cell> {
+    let (dx, dy) = (to.x.wrapping_sub(from.x), to.y.wrapping_sub(from.y));
+    let steps = dx.unsigned_abs().max(dy.unsigned_abs()) as i32;
+    let part = move |delta: i32, step: i32| {
+        (f64::from(delta) * f64::from(step) / f64::from(steps.max(1))).round() as i32
+    };
+    (0..=steps).map(move |step| from.offset(part(dx, step), part(dy, step)))
 }

@@ -8,9 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::bit_planes::{self, Planes};
 use super::field_of_view::FieldOfView;
-use super::himm::Laser;
+use super::himm::{Laser, Seen};
 use super::{Cell, LocalMapConfig, OccupancyRows};
-use crate::geometry::Pose2;
 use crate::scan::ScanGeometry;
 
 /// Occupancies of the cells within `radius_m` of the robot.
@@ -27,10 +26,8 @@ pub struct LocalMap {
     /// Half width in cells of each row of the disc, by its distance from the robot's row.
     half_widths: Vec<i32>,
     /// Cells under the robot, relative to it.
-    pub(super) footprint: Vec<(i32, i32)>,
-    /// Cells that the scan at hand found free, and hit; empty between scans.
-    pub(super) seen_free: Vec<u64>,
-    pub(super) seen_hit: Vec<u64>,
+    footprint: Vec<(i32, i32)>,
+    pub(super) seen: Seen,
 }
 
 impl LocalMap {
@@ -43,15 +40,14 @@ impl LocalMap {
         let num_words = 1usize << (2 * side_log2 - 6);
         Self {
             config: config.clone(),
-            laser: Laser::new(geometry, config),
+            laser: Laser::new(geometry),
             view: FieldOfView::new(radius),
             robot: None,
             side_log2,
             words: vec![bit_planes::filled(config.initial); num_words],
             half_widths: half_widths(radius),
             footprint: disc(config.robot_radius_m / config.resolution_m),
-            seen_free: vec![0; num_words],
-            seen_hit: vec![0; num_words],
+            seen: Seen::new(num_words),
         }
     }
 
@@ -147,7 +143,7 @@ impl LocalMap {
 
     /// Applies what the scan at hand saw, and forgets what it was.
     pub(super) fn apply_seen(&mut self) {
-        let seen = self.seen_free.iter_mut().zip(&mut self.seen_hit);
+        let seen = self.seen.free.iter_mut().zip(&mut self.seen.hit);
         for (planes, (free, hit)) in self.words.iter_mut().zip(seen) {
             if *free | *hit == 0 {
                 continue;
@@ -275,15 +271,5 @@ impl LocalMap {
         let offsets = self.robot.map(|_| disc(self.config.radius_cells())).unwrap_or_default();
         let robot = self.robot.unwrap_or_default();
         offsets.into_iter().map(move |(dx, dy)| robot.offset(dx, dy))
-    }
-
-    /// Cells from the robot's to the laser's, both included.
-    pub(super) fn cells_to_laser(&self, map_from_robot: &Pose2, laser: Cell) -> Vec<Cell> {
-        let robot = Cell::containing(&map_from_robot.position(), self.config.resolution_m);
-        let (dx, dy) = (laser.x.wrapping_sub(robot.x), laser.y.wrapping_sub(robot.y));
-        let steps = dx.unsigned_abs().max(dy.unsigned_abs()).max(1) as i32;
-        let part =
-            |delta: i32, step: i32| (f64::from(delta) * f64::from(step) / f64::from(steps)).round() as i32;
-        (0..=steps).map(|step| robot.offset(part(dx, step), part(dy, step))).collect()
     }
 }

@@ -58,10 +58,9 @@ impl Particles {
         self.weight[index]
     }
 
-    /// Mean weight, summed in order.
+    /// Mean weight, summed in a fixed order.
     pub fn mean_weight(&self) -> f64 {
-        let total: f64 = self.weight.iter().map(|&weight| f64::from(weight)).sum();
-        if self.is_empty() { 0.0 } else { total / self.len() as f64 }
+        if self.is_empty() { 0.0 } else { total(&self.weight) / self.len() as f64 }
     }
 
     /// Number of particles that an unweighted set of the same information would have: (Σw)² / Σw².
@@ -72,4 +71,16 @@ impl Particles {
         });
         if squares > 0.0 { sum * sum / squares } else { 0.0 }
     }
+}
+
+/// Sum of weights, as eight running sums side by side: one after another they would wait for each other.
+pub(super) fn total(weights: &[f32]) -> f64 {
+    let (blocks, rest) = weights.as_chunks::<8>();
+    let mut sums = [0.0f64; 8];
+    for block in blocks {
+        for (sum, &weight) in sums.iter_mut().zip(block) {
+            *sum += f64::from(weight);
+        }
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(|&weight| f64::from(weight)).sum::<f64>()
 }

@@ -1,30 +1,30 @@
 //! Low-variance resampling: one random number, then even steps through the running sum of weights (Probabilistic
 //! Robotics, table 4.4).
 
-use super::particles::Particles;
+use super::particles::{Particles, total};
 
 /// Draws `count` ancestors in ascending order, with probability proportional to weight; `start` in [0, 1) is the one
 /// random number. False, and nothing drawn, when no weight is positive. Cost: linear.
 pub(super) fn draw_ancestors(weights: &[f32], count: usize, start: f64, ancestors: &mut Vec<u32>) -> bool {
-    ancestors.clear();
-    let total: f64 = weights.iter().map(|&weight| f64::from(weight)).sum();
+    let total = total(weights);
     if !(total > 0.0 && total.is_finite()) {
         return false;
     }
+    ancestors.resize(count, 0);
     let step = total / count as f64;
-    let mut target = start * step;
-    let mut running = 0.0;
-    let mut last = 0;
+    let (mut target, mut running) = (start * step, 0.0);
+    let (mut num_drawn, mut last) = (0, 0);
     for (index, &weight) in weights.iter().enumerate() {
         running += f64::from(weight);
-        while target < running && ancestors.len() < count {
+        while target < running && num_drawn < count {
             last = index as u32;
-            ancestors.push(last);
-            target = (start + ancestors.len() as f64) * step;
+            ancestors[num_drawn] = last;
+            num_drawn += 1;
+            target = (start + num_drawn as f64) * step;
         }
     }
     // Rounding may leave the very last steps beyond the sum.
-    ancestors.resize(count, last);
+    ancestors[num_drawn..].fill(last);
     true
 }
 

@@ -1,6 +1,7 @@
 //! Everything localisation reads of one version of a map, computed once and shared by all sessions.
 
 use super::density_field::{DensityField, DensityFieldConfig};
+use super::global_search::SearchPyramid;
 use super::grid_map::{CellState, GridMap};
 use super::likelihood_field::{LikelihoodField, LikelihoodFieldConfig};
 use crate::geometry::Point2;
@@ -14,6 +15,8 @@ pub struct ServedMap {
     pub density: DensityField,
     /// Likelihood of beam ends.
     pub likelihood: LikelihoodField,
+    /// Bounds for the search over all poses.
+    pub pyramid: SearchPyramid,
     free_cells: Vec<u32>,
 }
 
@@ -23,7 +26,8 @@ impl ServedMap {
         let density = DensityField::build(&grid, density);
         let likelihood = LikelihoodField::build(&grid, likelihood);
         let free_cells = free_cells_by_neighbourhood(&grid);
-        Self { grid, density, likelihood, free_cells }
+        let pyramid = SearchPyramid::build(&grid, &likelihood);
+        Self { grid, density, likelihood, pyramid, free_cells }
     }
 
     /// Indices of all free cells, neighbours in the plane close together in the list.

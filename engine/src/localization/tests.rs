@@ -7,7 +7,7 @@ use super::*;
 use crate::geometry::{Point2, Pose2, angle_between};
 
 /// Two rooms of different size on a corridor, 12 × 9 m.
-fn building() -> GridMap {
+pub(super) fn building() -> GridMap {
     let mut map = GridMap::unknown(120, 90, 0.1, Point2::new(-4.0, 7.0));
     let mut fill = |columns: std::ops::Range<i64>, rows: std::ops::Range<i64>, state| {
         for (column, row) in columns.flat_map(|x| rows.clone().map(move |y| (x, y))) {
@@ -117,7 +117,7 @@ fn fields_take_few_bytes_per_free_cell() {
 }
 
 /// A drive along the corridor, through the door and round the larger room.
-fn drive() -> Vec<Pose2> {
+pub(super) fn drive() -> Vec<Pose2> {
     let corners = [(-3.0, 8.7), (-1.5, 8.7), (-1.5, 11.0), (-0.3, 14.3), (-2.6, 14.3), (-2.6, 11.0)];
     let mut poses = Vec::new();
     for pair in corners.windows(2) {

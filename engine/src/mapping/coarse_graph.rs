@@ -23,6 +23,7 @@ pub(crate) struct Closure {
 }
 
 /// Anchors at their best poses.
+#[derive(Clone)]
 pub(crate) struct CoarseGraph {
     /// Odometry between consecutive anchors of a run: index of the first, covariance.
     odometry: Vec<(usize, Matrix3<f64>)>,

@@ -39,6 +39,8 @@ pub struct MappingConfig {
     pub min_overlap: f64,
     /// Travel that must lie between two places of one run, metres.
     pub min_gap_m: f64,
+    /// Drives that run this close beside each other in the map are matched, metres.
+    pub beside_m: f64,
     /// Neighbours within this distance in the map are registered, metres.
     pub neighbour_distance_m: f64,
     /// Widest search around the predicted place, metres.
@@ -55,6 +57,8 @@ pub struct MappingConfig {
     pub min_joining_anchors: usize,
     /// Share of the tried anchors that must fit for that.
     pub min_joining_share: f64,
+    /// Largest standard deviation of the place of one run in the other, metres.
+    pub max_joining_sd_m: f64,
     /// The runner-up must have less than this share of the best hypothesis' support.
     pub max_ambiguity: f64,
 }
@@ -62,11 +66,7 @@ pub struct MappingConfig {
 impl Default for MappingConfig {
     fn default() -> Self {
         Self {
-            retrieval: RetrievalConfig {
-                candidates_per_window: 2,
-                query_step_m: 2.0,
-                ..RetrievalConfig::default()
-            },
+            retrieval: RetrievalConfig { query_step_m: 2.0, ..RetrievalConfig::default() },
             submap: SubmapConfig::default(),
             pose_graph: PoseGraphConfig::default(),
             anchor_spacing_m: 2.0,
@@ -80,6 +80,7 @@ impl Default for MappingConfig {
             min_agreement: 0.8,
             min_overlap: 0.25,
             min_gap_m: 10.0,
+            beside_m: 1.05,
             neighbour_distance_m: 5.0,
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
@@ -88,6 +89,7 @@ impl Default for MappingConfig {
             min_support: 2,
             min_joining_anchors: 5,
             min_joining_share: 0.7,
+            max_joining_sd_m: 0.2,
             max_ambiguity: 0.7,
         }
     }
@@ -109,6 +111,7 @@ impl MappingConfig {
             ("drift_turn_rad", self.drift_turn_rad),
             ("fit_floor_m", self.fit_floor_m),
             ("fit_floor_rad", self.fit_floor_rad),
+            ("beside_m", self.beside_m),
             ("neighbour_distance_m", self.neighbour_distance_m),
             ("max_search_m", self.max_search_m),
             ("max_search_turn_rad", self.max_search_turn_rad),

@@ -1,19 +1,26 @@
 //! From runs to one map: matches, constraints, the robust pose graph and what is served of it (SPEC section 2).
 
 mod anchors;
+mod candidates;
+mod claims;
 mod coarse_graph;
 mod config;
 mod guided;
+mod joining;
+mod judgements;
 mod mapper;
 mod memo;
 mod place_match;
+mod placement;
 mod run;
 mod site_map;
+mod stretches;
 
 pub use config::MappingConfig;
 pub use mapper::map_site;
 pub use memo::RegistrationMemo;
 pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
+pub use placement::{place_in_map, place_observations};
 pub use run::{Keyframe, RunRecord};
 pub use site_map::{MappedRun, SiteMap};
 

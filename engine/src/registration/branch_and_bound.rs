@@ -3,6 +3,8 @@
 //! A pyramid holds for every cell the best worth within the next 1, 2, 4, 8 cells to the right and up, so that one
 //! look bounds a whole block of offsets from above (Hess et al. 2016, after Olson 2009).
 
+use nalgebra::{Matrix2, Vector2};
+
 use super::evidence_grid::EvidenceGrid;
 use crate::geometry::{Point2, Pose2};
 
@@ -94,6 +96,31 @@ impl SearchPyramid {
             );
             (pose, f64::from(best.bound) / (2.0 * points.len() as f64))
         })
+    }
+
+    /// Covariance of the place of `pose` by how slowly the worth falls around it, square metres.
+    ///
+    /// Every offset within `half_m` counts with exp(−(number of returns lost) / `returns_per_e`): a place among clutter
+    /// keeps all weight at the middle, a plain corridor spreads it along itself however well the walls fit (after
+    /// Olson 2009).
+    pub fn spread(&self, points: &[Point2], pose: &Pose2, half_m: f64, returns_per_e: f64) -> Matrix2<f64> {
+        let cells = self.cells_at(points, pose, pose.theta);
+        let half_cells = (half_m / self.cell_m).round() as i32;
+        let mut scores = Vec::new();
+        for y in -half_cells..=half_cells {
+            for x in -half_cells..=half_cells {
+                scores.push((x, y, self.bound(0, &cells, x, y)));
+            }
+        }
+        let best = scores.iter().map(|score| score.2).max().unwrap_or(0);
+        let (mut total, mut covariance) = (0.0, Matrix2::zeros());
+        for (x, y, score) in scores {
+            let weight = (-0.5 * f64::from(best - score) / returns_per_e).exp();
+            let offset = Vector2::new(f64::from(x), f64::from(y)) * self.cell_m;
+            total += weight;
+            covariance += offset * offset.transpose() * weight;
+        }
+        covariance / total
     }
 
     fn descend(

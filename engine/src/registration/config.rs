@@ -6,16 +6,6 @@ use serde::{Deserialize, Serialize};
 use crate::config::ConfigError;
 use crate::geometry::Pose2;
 
-/// Everything about registering scans and submaps.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct RegistrationConfig {
-    /// Scan against recent scans.
-    pub refiner: RefinerConfig,
-    /// Submap against submap.
-    pub submap: SubmapConfig,
-}
-
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -50,6 +40,10 @@ pub struct SubmapConfig {
     pub max_iterations: usize,
     /// This many returns count as one independent measurement.
     pub correlated_returns: f64,
+    /// Offsets this far are tried to see whether the fit could slide, metres.
+    pub spread_half_m: f64,
+    /// An offset that loses this many returns has 1/e of the weight.
+    pub spread_returns_per_e: f64,
 }
 
 impl Default for SubmapConfig {
@@ -70,6 +64,8 @@ impl Default for SubmapConfig {
             min_count: 4,
             max_iterations: 10,
             correlated_returns: 10.0,
+            spread_half_m: 2.4,
+            spread_returns_per_e: 3.0,
         }
     }
 }
@@ -121,7 +117,11 @@ impl OdometryNoise {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinerConfig {
-    /// A scan is registered after this much travel, metres.
+    /// A scan is registered after this much travel since the last registered one, metres.
+    pub motion_distance_m: f64,
+    /// … or after this much turning, radians.
+    pub motion_turn_rad: f64,
+    /// A registered scan is a keyframe after this much travel since the last keyframe, metres.
     pub keyframe_distance_m: f64,
     /// … or after this much turning, radians.
     pub keyframe_turn_rad: f64,
@@ -149,6 +149,10 @@ pub struct RefinerConfig {
     pub max_iterations: usize,
     /// This many returns count as one independent measurement.
     pub correlated_returns: f64,
+    /// A fit with this share of returns on surfaces is not tried from other headings.
+    pub sure_inlier_share: f64,
+    /// Another heading must raise the share by this much to be believed.
+    pub min_turn_gain: f64,
     /// A fit with this share of returns on surfaces needs no search.
     pub good_inlier_share: f64,
     /// A fit with a smaller share is not believed: odometry stands.
@@ -170,6 +174,8 @@ pub struct RefinerConfig {
 impl Default for RefinerConfig {
     fn default() -> Self {
         Self {
+            motion_distance_m: 0.03,
+            motion_turn_rad: 0.01,
             keyframe_distance_m: 0.2,
             keyframe_turn_rad: 0.175,
             window_m: 12.0,
@@ -184,6 +190,8 @@ impl Default for RefinerConfig {
             first_outlier_m: 0.3,
             max_iterations: 10,
             correlated_returns: 3.0,
+            sure_inlier_share: 0.85,
+            min_turn_gain: 0.05,
             good_inlier_share: 0.7,
             min_inlier_share: 0.3,
             min_search_gain: 0.1,
@@ -193,17 +201,6 @@ impl Default for RefinerConfig {
             search_radius_m: 20.0,
             odometry: OdometryNoise::default(),
         }
-    }
-}
-
-impl RegistrationConfig {
-    /// Checks every value; `path` is this struct's own path.
-    ///
-    /// # Errors
-    /// The first field that cannot work.
-    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        self.refiner.validate(&format!("{path}.refiner"))?;
-        self.submap.validate(&format!("{path}.submap"))
     }
 }
 
@@ -242,6 +239,8 @@ impl RefinerConfig {
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
         let positive = [
+            ("motion_distance_m", self.motion_distance_m),
+            ("motion_turn_rad", self.motion_turn_rad),
             ("keyframe_distance_m", self.keyframe_distance_m),
             ("keyframe_turn_rad", self.keyframe_turn_rad),
             ("window_m", self.window_m),

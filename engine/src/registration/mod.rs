@@ -17,7 +17,7 @@ mod surface_map;
 pub(crate) mod testing;
 
 pub use branch_and_bound::SearchWindow;
-pub use config::{OdometryNoise, RefinerConfig, RegistrationConfig, SubmapConfig};
+pub use config::{OdometryNoise, RefinerConfig, SubmapConfig};
 pub(crate) use refiner::rotated;
 pub use refiner::{KeyframeMotion, OdometryRefiner, Refined};
 pub use register::{SubmapFit, refine_from, register};

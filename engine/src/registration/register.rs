@@ -49,7 +49,6 @@ pub fn refine_from(
         noise_m: config.noise_m,
         outlier_m: config.outlier_m,
         first_outlier_m: config.first_outlier_m,
-        min_count: config.min_count,
         max_iterations: config.max_iterations,
         correlated_returns: config.correlated_returns,
     };
@@ -66,9 +65,18 @@ pub fn refine_from(
     if opinions == 0 {
         return None;
     }
+    let mut covariance = alignment.information.try_inverse()?;
+    let spread = earlier.pyramid.spread(
+        &later.coarse_points,
+        &pose,
+        config.spread_half_m,
+        config.spread_returns_per_e,
+    );
+    let mut place = covariance.fixed_view_mut::<2, 2>(0, 0);
+    place += spread;
     Some(SubmapFit {
         earlier_from_later: pose,
-        covariance: alignment.information.try_inverse()?,
+        covariance,
         agreement: f64::from(confirmed) / f64::from(opinions),
         overlap: f64::from(opinions) / num_points,
     })

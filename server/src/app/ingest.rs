@@ -31,6 +31,22 @@ pub struct NewBatch {
     pub scans: Vec<Scan>,
 }
 
+impl NewBatch {
+    /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
+    pub(super) fn checked(
+        mut self,
+        geometry: &ScanGeometry,
+        num_known: usize,
+        before: Option<Pose2>,
+        step_max_m: f64,
+    ) -> Result<Vec<Scan>, AppError> {
+        check_readings(&mut self.scans, geometry)?;
+        let num_known = num_known.min(self.scans.len());
+        check_odometry(&self.scans, num_known, before, step_max_m)?;
+        Ok(self.scans.split_off(num_known))
+    }
+}
+
 impl App {
     /// Appends a batch to a run; the answer means that it would survive a power cut.
     ///
@@ -48,6 +64,7 @@ impl App {
         // A task of its own: a client that hangs up must not stop a commit half way.
         let work = async move {
             let _place = writer.queue()?;
+            let _generation = site.serving.read().await;
             let mut slot = writer.state.lock().await;
             app.open_runs.used(&writer);
             let mut state = app.wake(&site, &writer, slot.take()).await?;
@@ -70,10 +87,12 @@ impl App {
         let for_task = Arc::clone(&site);
         let work = async move {
             let _place = writer.queue()?;
+            let _generation = for_task.serving.read().await;
             let mut slot = writer.state.lock().await;
             let mut state = app.wake(&for_task, &writer, slot.take()).await?;
             if !state.head.value.is_finished {
                 finish(&for_task, &writer, &mut state).await?;
+                app.build_soon(&for_task);
             }
             Ok::<_, AppError>(())
         };
@@ -236,7 +255,7 @@ async fn append_fresh(
         (translator, scans, translated)
     })
     .await?;
-    state.translator = Some(translator);
+    state.put_translator(translator);
     let translated_s = started.elapsed().as_secs_f64();
     let mut batch = Batch::default();
     state.append_text(run, &translated, &mut batch);

@@ -7,20 +7,34 @@
 //! ```
 
 use std::collections::HashMap;
+use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use locution_engine::localization::{GridMap, ServedMap};
+use lru::LruCache;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::config::ServerConfig;
 use crate::storage::Storage;
 
+mod builds;
 mod error;
+pub mod exports;
+mod grids;
 mod ingest;
+mod jobs;
+pub mod labels;
+pub mod localisations;
+pub mod maps;
+pub mod matches;
 mod names;
+mod occupancy;
 mod open_runs;
 pub mod reading;
 pub mod records;
+mod regenerate;
+pub mod regions;
 mod run_writer;
 mod runs;
 mod scans;
@@ -28,15 +42,22 @@ mod series;
 mod site;
 mod trajectory;
 mod translation;
+pub mod word_queries;
 
 pub use error::AppError;
 pub use ingest::NewBatch;
+pub use jobs::{JobInfo, JobKind, JobState};
 pub use names::Name;
 pub use runs::{NewRun, RunInfo};
 pub use site::{Site, SiteInfo, SiteState, TextConfig};
 pub use trajectory::{Frame, StampedPose, Trajectory};
 
+use grids::GridKey;
+use localisations::Localisations;
 use open_runs::OpenRuns;
+
+/// Grids kept in memory; each has at most 64 million cells of one byte.
+const NUM_GRIDS_KEPT: NonZeroUsize = NonZeroUsize::new(4).expect("four is not zero");
 
 /// The application: every use case begins here.
 pub struct App {
@@ -44,8 +65,14 @@ pub struct App {
     storage: Arc<dyn Storage>,
     sites: Mutex<HashMap<Name, Arc<Site>>>,
     making_sites: tokio::sync::Mutex<()>,
+    opening_sites: tokio::sync::Mutex<()>,
     batch_slots: Arc<Semaphore>,
+    job_slots: Semaphore,
     open_runs: OpenRuns,
+    grids: Mutex<LruCache<GridKey, Arc<GridMap>>>,
+    drawing: tokio::sync::Mutex<()>,
+    served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
+    localisations: Localisations,
 }
 
 impl App {
@@ -53,11 +80,17 @@ impl App {
     pub fn new(config: ServerConfig, storage: Arc<dyn Storage>) -> Self {
         Self {
             batch_slots: Arc::new(Semaphore::new(config.limits.num_batches_max)),
+            job_slots: Semaphore::new(config.builds.num_builds_max),
             open_runs: OpenRuns::new(config.limits.num_open_runs_max),
+            grids: Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
+            drawing: tokio::sync::Mutex::default(),
+            served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
+            localisations: Localisations::default(),
             config,
             storage,
             sites: Mutex::default(),
             making_sites: tokio::sync::Mutex::default(),
+            opening_sites: tokio::sync::Mutex::default(),
         }
     }
 
@@ -75,6 +108,19 @@ impl App {
         Arc::clone(&self.batch_slots)
             .try_acquire_owned()
             .map_err(|_| AppError::Busy { queue, retry_after: Duration::from_secs(1) })
+    }
+
+    /// Opens every site, so that what was interrupted goes on; a site that cannot be opened does not stop the others.
+    ///
+    /// # Errors
+    /// Those of the storage as a whole.
+    pub async fn resume(self: &Arc<Self>) -> Result<(), AppError> {
+        for name in self.storage.list().await? {
+            if let Err(error) = self.site(&Name::new(&name, "site")?).await {
+                tracing::error!(site = name, %error, "the site cannot be opened");
+            }
+        }
+        Ok(())
     }
 
     /// Whether the storage answers.

@@ -219,6 +219,23 @@ impl WriterState {
         self.text.value.num_checkpoint_parts = 0;
     }
 
+    /// Scans that the text covers.
+    pub(super) fn num_scans_translated(&self) -> u64 {
+        self.text.value.num_scans
+    }
+
+    /// Puts the translator back.
+    pub(super) fn put_translator(&mut self, translator: RunTranslator) {
+        self.translator = Some(translator);
+    }
+
+    /// Adds only the text's head, for a generation that does not serve yet.
+    pub(super) fn append_text_head(&mut self, run: RunIdx, batch: &mut Batch) -> Vec<Precondition> {
+        let mut preconditions = Vec::new();
+        self.text.put(&Key::TextHead(self.generation, run), batch, &mut preconditions);
+        preconditions
+    }
+
     /// Adds the heads to a batch, with the conditions that nobody moved them meanwhile.
     pub(super) fn append_heads(&mut self, run: RunIdx, batch: &mut Batch) -> Vec<Precondition> {
         let mut preconditions = Vec::new();

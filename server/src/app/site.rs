@@ -1,12 +1,15 @@
 //! Sites: made, found, described, deleted.
 
 use std::collections::HashMap;
+use std::sync::atomic::AtomicU64;
 use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use bytes::Bytes;
 use locution_engine::config::EngineConfig;
+use locution_engine::mapping::RegistrationMemo;
 use locution_engine::text::Quantizer;
 
+use super::jobs::Jobs;
 use super::records::{RunHead, SiteRecord, TextHead};
 use super::run_writer::RunWriter;
 use super::{App, AppError, Name};
@@ -22,6 +25,12 @@ pub struct Site {
     /// Held while the record is changed, so that changes of one process queue up instead of conflicting.
     changing: tokio::sync::Mutex<()>,
     pub(super) making_runs: tokio::sync::Mutex<()>,
+    /// Held for reading while scans are appended, for writing while another text generation begins to serve.
+    pub(super) serving: tokio::sync::RwLock<()>,
+    pub(super) jobs: Jobs,
+    pub(super) build_requests: AtomicU64,
+    /// Registrations that earlier builds computed.
+    pub(super) memo: Mutex<RegistrationMemo>,
 }
 
 /// The site's record as last read or written.
@@ -107,6 +116,24 @@ impl Site {
         self.state().record.generation
     }
 
+    /// Makes another text generation, written with its own partition, the serving one.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub(super) async fn serve_generation(
+        &self,
+        generation: Generation,
+        quantizer: &Quantizer,
+    ) -> Result<(), AppError> {
+        let quantizer_json = serde_json::to_string(quantizer).map_err(AppError::internal)?;
+        self.change(|record, _| {
+            record.generation = generation;
+            record.quantizer_json = Some(quantizer_json);
+            Ok(())
+        })
+        .await
+    }
+
     /// Changes the record together with other writes: `change` edits the record and may add to the batch.
     ///
     /// # Errors
@@ -164,7 +191,7 @@ impl App {
     /// [`AppError::Invalid`] for a configuration that cannot work, [`AppError::Exists`] when the site stands with
     /// another one.
     pub async fn make_site(
-        &self,
+        self: &Arc<Self>,
         name: &Name,
         config: Option<EngineConfig>,
     ) -> Result<(Arc<Site>, bool), AppError> {
@@ -188,7 +215,7 @@ impl App {
         }
     }
 
-    async fn create_site(&self, name: &Name, config: EngineConfig) -> Result<Arc<Site>, AppError> {
+    async fn create_site(self: &Arc<Self>, name: &Name, config: EngineConfig) -> Result<Arc<Site>, AppError> {
         let record = SiteRecord {
             config_json: serde_json::to_string(&config).map_err(AppError::internal)?,
             num_runs: 0,
@@ -209,7 +236,11 @@ impl App {
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub async fn site(&self, name: &Name) -> Result<Arc<Site>, AppError> {
+    pub async fn site(self: &Arc<Self>, name: &Name) -> Result<Arc<Site>, AppError> {
+        if let Some(site) = self.sites.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
+            return Ok(Arc::clone(site));
+        }
+        let _queue = self.opening_sites.lock().await;
         if let Some(site) = self.sites.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
             return Ok(Arc::clone(site));
         }
@@ -226,16 +257,25 @@ impl App {
             writers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
             making_runs: tokio::sync::Mutex::default(),
+            serving: tokio::sync::RwLock::default(),
+            jobs: Jobs::default(),
+            build_requests: AtomicU64::new(0),
+            memo: Mutex::default(),
         });
-        let mut sites = self.sites.lock().unwrap_or_else(PoisonError::into_inner);
-        Ok(Arc::clone(sites.entry(name.clone()).or_insert(site)))
+        site.load_jobs().await?;
+        self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
+        self.work_on(&site);
+        Ok(site)
     }
 
     /// All sites that `is_wanted`, by name.
     ///
     /// # Errors
     /// Those of the storage.
-    pub async fn sites(&self, is_wanted: impl Fn(&str) -> bool) -> Result<Vec<Arc<Site>>, AppError> {
+    pub async fn sites(
+        self: &Arc<Self>,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Result<Vec<Arc<Site>>, AppError> {
         let mut sites = Vec::new();
         for name in self.storage.list().await? {
             if !is_wanted(&name) {
@@ -255,7 +295,7 @@ impl App {
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub async fn delete_site(&self, name: &Name) -> Result<(), AppError> {
+    pub async fn delete_site(self: &Arc<Self>, name: &Name) -> Result<(), AppError> {
         let _queue = self.making_sites.lock().await;
         self.site(name).await?;
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).remove(name);

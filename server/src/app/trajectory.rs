@@ -52,9 +52,10 @@ impl Site {
         &self,
         info: &RunInfo,
         frame: Frame,
-        _version: Option<u64>,
+        version: Option<u64>,
     ) -> Result<Trajectory, AppError> {
         let stamps = read_stamps(&**self.store(), info.idx, 0..info.head.next_sequence).await?;
+        let mut component = None;
         let anchors = match frame {
             Frame::Odom => Vec::new(),
             Frame::Run => {
@@ -62,10 +63,17 @@ impl Site {
                 keyframes.iter().map(|keyframe| (keyframe.scan_seq, keyframe.run_from_robot)).collect()
             }
             Frame::Map => {
-                return Err(AppError::NotReady { detail: "no map has been built; POST …/builds".into() });
+                let map = self.map(version).await?;
+                let in_map = map.runs.iter().find(|run| run.run == info.idx && run.num_poses > 0);
+                let in_map = in_map.ok_or_else(|| AppError::NotReady {
+                    detail: format!("the run `{}` came after map version {}", info.run.name, map.version),
+                })?;
+                component = Some(in_map.component);
+                let poses = self.map_poses(&map, in_map).await?;
+                poses.iter().map(|pose| (pose.scan_seq, pose.map_from_robot)).collect()
             }
         };
-        Ok(Trajectory { component: None, poses: spread(&stamps, &anchors) })
+        Ok(Trajectory { component, poses: spread(&stamps, &anchors) })
     }
 }
 

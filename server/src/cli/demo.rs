@@ -31,18 +31,65 @@ const PLAN_YAML: &str = include_str!("../../worlds/office.yaml");
 /// Name, seed and waypoints of each robot. The first knows the west, the second the east, and the third drives round
 /// the whole floor the other way.
 const ROBOTS: [(&str, u64, &[(f64, f64)]); 3] = [
-    ("porter-1", 11, &[
-        (9.5, 13.0), (9.5, 24.3), (22.6, 24.3), (22.6, 27.4), (29.3, 24.3), (29.3, 10.7), (9.5, 10.7), (9.5, 24.3),
-        (29.3, 24.3), (29.9, 33.0), (29.3, 24.3), (29.3, 10.7), (16.0, 10.7),
-    ]),
-    ("porter-2", 12, &[
-        (41.0, 19.0), (34.6, 13.0), (38.0, 10.7), (50.2, 10.7), (50.2, 24.3), (29.3, 24.3), (29.3, 10.7),
-        (50.2, 10.7), (50.2, 24.3), (38.4, 24.3), (38.4, 21.5), (32.0, 16.2), (29.3, 16.2), (29.3, 10.7), (42.0, 10.7),
-    ]),
-    ("cleaner", 13, &[
-        (29.0, 3.0), (29.3, 10.7), (50.2, 10.7), (50.2, 24.3), (9.5, 24.3), (9.5, 10.7), (29.3, 10.7), (29.3, 24.3),
-        (50.2, 24.3), (50.2, 10.7), (29.3, 10.7), (9.5, 10.7), (9.5, 22.0),
-    ]),
+    (
+        "porter-1",
+        11,
+        &[
+            (9.5, 13.0),
+            (9.5, 24.3),
+            (22.6, 24.3),
+            (22.6, 27.4),
+            (29.3, 24.3),
+            (29.3, 10.7),
+            (9.5, 10.7),
+            (9.5, 24.3),
+            (29.3, 24.3),
+            (29.9, 33.0),
+            (29.3, 24.3),
+            (29.3, 10.7),
+            (16.0, 10.7),
+        ],
+    ),
+    (
+        "porter-2",
+        12,
+        &[
+            (41.0, 19.0),
+            (34.6, 13.0),
+            (38.0, 10.7),
+            (50.2, 10.7),
+            (50.2, 24.3),
+            (29.3, 24.3),
+            (29.3, 10.7),
+            (50.2, 10.7),
+            (50.2, 24.3),
+            (38.4, 24.3),
+            (38.4, 21.5),
+            (32.0, 16.2),
+            (29.3, 16.2),
+            (29.3, 10.7),
+            (42.0, 10.7),
+        ],
+    ),
+    (
+        "cleaner",
+        13,
+        &[
+            (29.0, 3.0),
+            (29.3, 10.7),
+            (50.2, 10.7),
+            (50.2, 24.3),
+            (9.5, 24.3),
+            (9.5, 10.7),
+            (29.3, 10.7),
+            (29.3, 24.3),
+            (50.2, 24.3),
+            (50.2, 10.7),
+            (29.3, 10.7),
+            (9.5, 10.7),
+            (9.5, 22.0),
+        ],
+    ),
 ];
 
 /// Runs on a fresh machine, without any file but the binary.
@@ -70,10 +117,14 @@ async fn demo(arguments: &DemoArguments) -> Result<()> {
     let directory = &arguments.directory;
     let server = serve(&directory.join("data")).await?;
     let client = Client::new(&server.url())?;
-    println!("Locution serves on {}. Three robots are about to drive through an office floor of 60 × 35 m.\n", server.url());
+    println!(
+        "Locution serves on {}. Three robots are about to drive through an office floor of 60 × 35 m.\n",
+        server.url()
+    );
 
     let simulated = tokio::task::spawn_blocking(simulate).await??;
-    let recordings: Vec<Recording> = ROBOTS.iter().zip(&simulated).map(|(robot, run)| recording(robot.0, run)).collect();
+    let recordings: Vec<Recording> =
+        ROBOTS.iter().zip(&simulated).map(|(robot, run)| recording(robot.0, run)).collect();
     send(&client, &recordings).await?;
     println!("\nBuilding the map …");
     let built = Instant::now();
@@ -170,29 +221,34 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
     let judged: Vec<JudgedMatch> = matches.iter().filter_map(|found| judged_match(found, &names)).collect();
     let recognition = judge_recognition(&runs, &judged);
     let num_verified = judged.iter().filter(|found| found.is_verified).count();
-    let num_between = matches.iter().filter(|found| found.state == "verified" && found.earlier.run != found.later.run);
+    let num_between =
+        matches.iter().filter(|found| found.state == "verified" && found.earlier.run != found.later.run);
     println!("What was recognised (against the simulator's truth)");
     println!("  candidates          {}", judged.len());
     println!("  verified matches    {num_verified}, {} of them between two robots", num_between.count());
-    println!("  revisits            {} the same way, {} the opposite way", recognition.revisits.same, recognition.revisits.opposite);
+    println!(
+        "  revisits            {} the same way, {} the opposite way",
+        recognition.revisits.same, recognition.revisits.opposite
+    );
     println!("  verified precision  {:.1} %", 100.0 * recognition.verified.precision);
     println!("  verified recall     {:.1} %", 100.0 * recognition.verified.recall_all);
 
     let before = trajectory_errors(client, &names, simulated, "odom").await?;
     let after = trajectory_errors(client, &names, simulated, "map").await?;
-    let rows: Vec<Vec<String>> = [("odometry, each robot by itself", before), ("map, all robots together", after)]
-        .into_iter()
-        .flat_map(|(what, errors)| {
-            errors.into_iter().map(move |(part, error)| {
-                vec![
-                    format!("{what}: {part}"),
-                    format!("{:.3} ± {:.3}", error.translation_m.mean, error.translation_m.sd),
-                    format!("{:.3}", error.translation_max_m),
-                    format!("{:.2}", error.rotation_deg.mean),
-                ]
+    let rows: Vec<Vec<String>> =
+        [("odometry, each robot by itself", before), ("map, all robots together", after)]
+            .into_iter()
+            .flat_map(|(what, errors)| {
+                errors.into_iter().map(move |(part, error)| {
+                    vec![
+                        format!("{what}: {part}"),
+                        format!("{:.3} ± {:.3}", error.translation_m.mean, error.translation_m.sd),
+                        format!("{:.3}", error.translation_max_m),
+                        format!("{:.2}", error.rotation_deg.mean),
+                    ]
+                })
             })
-        })
-        .collect();
+            .collect();
     println!("\nMap error before and after optimisation");
     println!("{}", table(&["", "position m", "largest m", "heading °"], &rows));
     Ok(())

@@ -4,7 +4,15 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod demo;
+mod eval;
+mod output;
+mod recordings;
+mod replay;
 mod serve;
+mod simulate;
+mod upload;
+mod worlds;
 
 /// Place recognition for robots with a 2D laser.
 #[derive(Debug, Parser)]
@@ -18,12 +26,24 @@ struct Arguments {
 enum Command {
     /// Start the server.
     Serve(serve::ServeArguments),
+    /// Let three simulated robots map an office floor, and show what was recognised.
+    Demo(demo::DemoArguments),
+    /// Post recordings to a running server.
+    Replay(replay::ReplayArguments),
+    /// Write a recording and its truth from a robot driving through a world.
+    Simulate(simulate::SimulateArguments),
+    /// Measure how well it works.
+    Eval(eval::EvalArguments),
 }
 
 /// Reads the arguments, runs the command and says what went wrong.
 pub fn run() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Serve(arguments) => serve::run(arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Replay(arguments) => replay::run(&arguments),
+        Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Eval(arguments) => eval::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -30,7 +30,8 @@ pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
         });
         format!("  {}\n", padded.collect::<Vec<_>>().join("  ").trim_end())
     };
-    let rule = format!("  {}\n", "─".repeat(widths.iter().sum::<usize>() + 2 * num_columns.saturating_sub(1)));
+    let rule =
+        format!("  {}\n", "─".repeat(widths.iter().sum::<usize>() + 2 * num_columns.saturating_sub(1)));
     let body: String = rows.iter().map(|row| line(row.iter().map(String::as_str).collect())).collect();
     format!("{}{rule}{body}", line(header.to_vec()))
 }
@@ -42,7 +43,8 @@ mod tests {
     #[test]
     fn columns_line_up() {
         let rows = vec![vec!["aces".into(), "7374".into()], vec!["mit-killian".into(), "5".into()]];
-        let expected = "  name         scans\n  ──────────────────\n  aces          7374\n  mit-killian      5\n";
+        let expected =
+            "  name         scans\n  ──────────────────\n  aces          7374\n  mit-killian      5\n";
         assert_eq!(table(&["name", "scans"], &rows), expected);
     }
 }

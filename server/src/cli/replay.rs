@@ -76,10 +76,14 @@ pub struct ReplayArguments {
 /// # Errors
 /// A file that cannot be read; a server that refuses or does not answer.
 pub fn run(arguments: &ReplayArguments) -> Result<()> {
-    ensure!(arguments.run.is_none() || arguments.files.len() == 1, "--run names one run, but there are several files");
+    ensure!(
+        arguments.run.is_none() || arguments.files.len() == 1,
+        "--run names one run, but there are several files"
+    );
     ensure!(arguments.rate.is_none_or(|rate| rate > 0.0), "--rate must be above zero");
     ensure!(arguments.batch > 0, "--batch must be above zero");
-    let options = CarmenOptions { range_max_m: arguments.range_max, skip_malformed: arguments.skip_malformed };
+    let options =
+        CarmenOptions { range_max_m: arguments.range_max, skip_malformed: arguments.skip_malformed };
     let mut recordings: Vec<Recording> = Vec::new();
     for file in &arguments.files {
         let mut recording = read_recording(file, options)?;

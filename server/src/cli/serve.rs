@@ -2,11 +2,15 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use anyhow::Context;
 use clap::Args;
 use serde::Serialize;
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::Layer;
+use tracing_subscriber::filter::Targets;
+use tracing_subscriber::layer::SubscriberExt;
+use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::config::{LogConfig, ServerConfig};
 use crate::start_server;
@@ -44,22 +48,26 @@ pub fn run(arguments: ServeArguments) -> anyhow::Result<()> {
     }
     start_logging(&config.log)?;
     let runtime = tokio::runtime::Builder::new_multi_thread().enable_all().build()?;
-    runtime.block_on(async {
+    let outcome = runtime.block_on(async {
         let server = start_server(config).await?;
         // Scripts that start the server on port 0 read the address here.
         println!("listening on {}", server.url());
         until_interrupted().await?;
         tracing::info!("stopping");
         Ok(server.shutdown().await?)
-    })
+    });
+    // A build that is under way would hold up the exit; it is begun anew at the next start.
+    runtime.shutdown_timeout(Duration::from_secs(2));
+    outcome
 }
 
 /// Logs go to standard error, so that standard output stays for answers.
 fn start_logging(config: &LogConfig) -> anyhow::Result<()> {
-    let filter = EnvFilter::try_new(&config.filter).context("log.filter")?;
-    let subscriber = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let filter: Targets = config.filter.parse().context("log.filter")?;
+    let layer = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    let layer = if config.is_json { layer.json().boxed() } else { layer.boxed() };
     // A second start in one process, as in tests, keeps the first subscriber.
-    let _ = if config.is_json { subscriber.json().try_init() } else { subscriber.try_init() };
+    let _ = tracing_subscriber::registry().with(layer.with_filter(filter)).try_init();
     Ok(())
 }
 

@@ -85,7 +85,8 @@ impl SimulateArguments {
         let mut config = SimulationConfig::default();
         config.laser.field_of_view_deg = self.fov;
         let num_gaps = self.fov.clamp(1.0, 360.0).round() as usize;
-        config.laser.num_ranges = self.beams.unwrap_or(if self.fov < 360.0 { num_gaps + 1 } else { num_gaps });
+        config.laser.num_ranges =
+            self.beams.unwrap_or(if self.fov < 360.0 { num_gaps + 1 } else { num_gaps });
         config.laser.range_max_m = self.range_max;
         config.laser.range_noise_std_m = self.noise;
         config.odometry = config.odometry.scaled(self.drift);
@@ -103,8 +104,11 @@ impl SimulateArguments {
 pub fn run(arguments: &SimulateArguments) -> Result<()> {
     let (task, config) = (arguments.task()?, arguments.config());
     let name = arguments.out.to_string_lossy().into_owned();
-    let second = arguments.second_world.iter().map(|world| (world, format!("{name}-second"), arguments.seed + 1));
-    for (world_path, name, seed) in std::iter::once((&arguments.world, name.clone(), arguments.seed)).chain(second) {
+    let second =
+        arguments.second_world.iter().map(|world| (world, format!("{name}-second"), arguments.seed + 1));
+    for (world_path, name, seed) in
+        std::iter::once((&arguments.world, name.clone(), arguments.seed)).chain(second)
+    {
         let simulated = simulate_run(&read_world(world_path)?, &task, &config, seed)
             .with_context(|| world_path.display().to_string())?;
         let written = write_recording(&simulated, &name, arguments.gzip)?;
@@ -158,11 +162,10 @@ mod tests {
 
     #[test]
     fn points_are_read_or_refused() {
-        assert_eq!(parse_points("1,2 -3.5,4;5,6").unwrap(), [
-            Point2::new(1.0, 2.0),
-            Point2::new(-3.5, 4.0),
-            Point2::new(5.0, 6.0)
-        ]);
+        assert_eq!(
+            parse_points("1,2 -3.5,4;5,6").unwrap(),
+            [Point2::new(1.0, 2.0), Point2::new(-3.5, 4.0), Point2::new(5.0, 6.0)]
+        );
         for bad in ["1 2", "1,x", "nan,1", "1,2,3"] {
             assert!(parse_points(bad).is_err(), "{bad}");
         }

@@ -76,8 +76,10 @@ pub async fn upload_recording(
     bar.set_position(first as u64);
     bar.reset_eta();
     if upload.is_finished() {
+        let status = client.run(site, run).await?;
         bar.finish_with_message("already finished");
-        return Ok(uploaded);
+        let (num_observations, num_words) = (status.num_observations, status.num_words);
+        return Ok(Uploaded { num_observations, num_words, ..uploaded });
     }
     let mut pace = Pace::new(options.rate);
     for batch in log.scans[first..].chunks(options.num_scans_per_batch.max(1)) {
@@ -101,7 +103,10 @@ pub async fn upload_recording(
         uploaded.num_words = status.num_words;
     }
     uploaded.duration_s = began.elapsed().as_secs_f64();
-    bar.finish_with_message(format!("{} observations, {} words", uploaded.num_observations, uploaded.num_words));
+    bar.finish_with_message(format!(
+        "{} observations, {} words",
+        uploaded.num_observations, uploaded.num_words
+    ));
     Ok(uploaded)
 }
 

@@ -17,7 +17,8 @@ pub fn read_world(yaml_path: &Path) -> Result<World> {
     let in_yaml = || yaml_path.display().to_string();
     let yaml = parse_map_server_yaml(&read_text(yaml_path)?).with_context(in_yaml)?;
     let image_path = yaml_path.parent().unwrap_or(Path::new(".")).join(&yaml.image);
-    let bytes = std::fs::read(&image_path).with_context(|| format!("cannot open {}", image_path.display()))?;
+    let bytes =
+        std::fs::read(&image_path).with_context(|| format!("cannot open {}", image_path.display()))?;
     let image = decode_picture(&bytes).with_context(|| image_path.display().to_string())?;
     World::from_map_server(&image, &yaml).with_context(in_yaml)
 }

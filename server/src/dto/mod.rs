@@ -2,6 +2,11 @@
 
 pub mod batches;
 pub mod common;
+pub mod jobs;
+pub mod labels;
+pub mod localisations;
+pub mod maps;
+pub mod queries;
 pub mod runs;
 pub mod sites;
 pub mod texts;

@@ -1,7 +1,14 @@
 //! One file per resource; a handler extracts, calls one use case and wraps the answer.
 
 pub mod batches;
+pub mod encodings;
+pub mod jobs;
+pub mod labels;
+pub mod localisations;
+pub mod maps;
+pub mod matches;
 pub mod operations;
+pub mod queries;
 pub mod runs;
 pub mod sites;
 pub mod texts;

@@ -108,7 +108,8 @@ impl RecordingArguments {
     /// The server refused something.
     pub async fn send(&self, server: &LocalServer, recordings: Vec<Recording>) -> Result<Vec<SentRecording>> {
         let config = self.config.as_ref().map(|path| -> Result<serde_json::Value> {
-            let text = std::fs::read_to_string(path).with_context(|| format!("cannot open {}", path.display()))?;
+            let text =
+                std::fs::read_to_string(path).with_context(|| format!("cannot open {}", path.display()))?;
             serde_json::from_str(&text).with_context(|| path.display().to_string())
         });
         server.client.put_site(SITE, config.transpose()?.as_ref()).await?;

@@ -3,11 +3,14 @@
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
+mod labels;
 pub mod local_server;
+mod localization;
 mod map;
 mod plot;
 pub mod recognition;
 mod stroke_font;
+mod thesis;
 
 /// Prints tables and writes JSON.
 #[derive(Debug, Args)]
@@ -22,6 +25,12 @@ enum What {
     Recognition(recognition::RecognitionArguments),
     /// Error of the map against hand-verified relative poses.
     Map(map::MapArguments),
+    /// Confusion of place labels against labelled regions.
+    Labels(labels::LabelsArguments),
+    /// Robots switched on at random moments: found, wrongly sure or honestly unsure.
+    Localization(localization::LocalizationArguments),
+    /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
+    Thesis(thesis::ThesisArguments),
 }
 
 /// Runs one evaluation.
@@ -34,6 +43,9 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
         match &arguments.what {
             What::Recognition(arguments) => recognition::run(arguments).await,
             What::Map(arguments) => map::run(arguments).await,
+            What::Labels(arguments) => labels::run(arguments).await,
+            What::Localization(arguments) => localization::run(arguments).await,
+            What::Thesis(arguments) => thesis::run(arguments),
         }
     })
 }

@@ -79,7 +79,8 @@ impl Plot {
             draw_text(canvas, &tick_label(y, self.y_range), (from.0 - 8.0, from.1 - 5.0), Anchor::End, ink);
         }
         let corner = self.place((self.x_range.0, self.y_range.0));
-        let (top, right) = (self.place((self.x_range.0, self.y_range.1)), self.place((self.x_range.1, self.y_range.0)));
+        let (top, right) =
+            (self.place((self.x_range.0, self.y_range.1)), self.place((self.x_range.1, self.y_range.0)));
         draw_polyline(canvas, &[top, corner, right], ink, 1.5);
         let middle = LEFT + (WIDTH - LEFT - RIGHT) / 2.0;
         draw_text(canvas, &self.title, (middle, 12.0), Anchor::Middle, ink);
@@ -150,8 +151,10 @@ fn draw_text(canvas: &mut Pixmap, text: &str, (x, y): (f32, f32), anchor: Anchor
     };
     for character in text.chars() {
         for stroke in strokes(character) {
-            let places: Vec<(f32, f32)> =
-                stroke.iter().map(|(column, row)| (left + column * TEXT_SCALE, y + row * TEXT_SCALE)).collect();
+            let places: Vec<(f32, f32)> = stroke
+                .iter()
+                .map(|(column, row)| (left + column * TEXT_SCALE, y + row * TEXT_SCALE))
+                .collect();
             draw_polyline(canvas, &places, color, 1.3);
         }
         left += ADVANCE * TEXT_SCALE;

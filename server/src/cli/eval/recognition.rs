@@ -67,7 +67,10 @@ pub(super) async fn run(arguments: &RecognitionArguments) -> Result<()> {
     let num_logs = arguments.recordings.logs.len();
     ensure!(arguments.truth.len() == num_logs, "give one --truth for each --log, in the same order");
     let buildings = &arguments.buildings;
-    ensure!(buildings.is_empty() || buildings.len() == num_logs, "--buildings names one building for each --log");
+    ensure!(
+        buildings.is_empty() || buildings.len() == num_logs,
+        "--buildings names one building for each --log"
+    );
     let recordings = arguments.recordings.read()?;
     let server = LocalServer::start().await?;
     let began = Instant::now();
@@ -78,9 +81,9 @@ pub(super) async fn run(arguments: &RecognitionArguments) -> Result<()> {
         let name = &sent.recording.name;
         let observations = server.client.observations(SITE, name).await?;
         let truth = read_truth(&arguments.truth[idx])?;
-        let truth_frame = buildings.get(idx).map_or(0, |building| {
-            buildings.iter().position(|other| other == building).unwrap_or(idx) as u32
-        });
+        let truth_frame = buildings
+            .get(idx)
+            .map_or(0, |building| buildings.iter().position(|other| other == building).unwrap_or(idx) as u32);
         runs.push(judged_run(&sent.recording, &observations, &truth, truth_frame));
         reports.push(recording_report(&server.client, sent).await?);
     }
@@ -196,8 +199,9 @@ fn print_report(report: &Report) {
         .recordings
         .iter()
         .map(|recording| {
-            let at_least =
-                |n: usize| recording.ngram_matches.range(n..).map(|(_, count)| count).sum::<usize>().to_string();
+            let at_least = |n: usize| {
+                recording.ngram_matches.range(n..).map(|(_, count)| count).sum::<usize>().to_string()
+            };
             vec![
                 recording.name.clone(),
                 recording.scans.to_string(),
@@ -243,7 +247,9 @@ fn curve_picture(recognition: &RecognitionReport) -> Result<Vec<u8>> {
     let line = |name: &str, color: [u8; 3], recall: &dyn Fn(usize) -> f64| Line {
         name: name.to_owned(),
         color,
-        points: (0..recognition.curve.len()).map(|idx| (recall(idx), recognition.curve[idx].precision)).collect(),
+        points: (0..recognition.curve.len())
+            .map(|idx| (recall(idx), recognition.curve[idx].precision))
+            .collect(),
         has_markers: false,
     };
     let curve = &recognition.curve;

@@ -63,7 +63,11 @@ pub(super) fn strokes(character: char) -> Vec<Vec<(f32, f32)>> {
         let mut digits = digits.bytes().map(|byte| f32::from(byte - b'0'));
         (digits.next().unwrap_or(0.0), digits.next().unwrap_or(0.0))
     };
-    chains.split(',').filter(|chain| !chain.is_empty()).map(|chain| chain.split(' ').map(point).collect()).collect()
+    chains
+        .split(',')
+        .filter(|chain| !chain.is_empty())
+        .map(|chain| chain.split(' ').map(point).collect())
+        .collect()
 }
 
 #[cfg(test)]

@@ -1,0 +1,178 @@
+//! Where two drives of the finished map run along each other: the claims that a map makes.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{FRAC_PI_4, PI};
+
+use super::run::RunRecord;
+use crate::geometry::{Pose2, angle_between};
+use crate::text::{Direction, Interval};
+
+/// Two stretches that lie beside each other in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Stretch {
+    /// The stretch driven first.
+    pub earlier: Interval,
+    /// The stretch driven later.
+    pub later: Interval,
+    /// Same or opposite way.
+    pub direction: Direction,
+}
+
+/// What counts as beside each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StretchSettings {
+    /// Largest distance, metres.
+    pub distance_m: f64,
+    /// Travel that must lie between two places of one run, metres.
+    pub min_gap_m: f64,
+    /// Longest stretch, observations: short ones are proportional enough.
+    pub max_observations: u32,
+}
+
+/// A pair of observations beside each other.
+#[derive(Clone, Copy, Debug)]
+struct Link {
+    run_idx: u32,
+    observation: u32,
+    direction: Direction,
+}
+
+/// A stretch that may still grow.
+#[derive(Clone, Copy, Debug)]
+struct Growing {
+    stretch: Stretch,
+    last: Link,
+}
+
+type Cells = BTreeMap<(u32, i32, i32), Vec<(u32, u32)>>;
+
+/// All stretches, in order of the later one.
+///
+/// `poses` holds for each run the poses of its observations, `components` the frame in which they are given.
+pub(crate) fn find_stretches(
+    runs: &[RunRecord<'_>],
+    poses: &[Vec<Pose2>],
+    components: &[u32],
+    settings: &StretchSettings,
+) -> Vec<Stretch> {
+    let cell_of = |value: f64| (value / settings.distance_m).floor() as i32;
+    let mut cells: Cells = BTreeMap::new();
+    let mut finished = Vec::new();
+    for (run_idx, run_poses) in poses.iter().enumerate() {
+        let mut growing: Vec<Growing> = Vec::new();
+        // Observations enter the cells once the gap lies behind them, so that whatever is found may be matched.
+        let mut num_entered = 0;
+        for (index, pose) in run_poses.iter().enumerate() {
+            let travel_m = runs[run_idx].observations[index].travel_m;
+            while runs[run_idx].observations[num_entered].travel_m + settings.min_gap_m <= travel_m {
+                let entering = &run_poses[num_entered];
+                let cell = (components[run_idx], cell_of(entering.x), cell_of(entering.y));
+                cells.entry(cell).or_default().push((run_idx as u32, num_entered as u32));
+                num_entered += 1;
+            }
+            let mut near = Vec::new();
+            for dy in -1..=1 {
+                for dx in -1..=1 {
+                    let cell = (components[run_idx], cell_of(pose.x) + dx, cell_of(pose.y) + dy);
+                    near.extend(cells.get(&cell).into_iter().flatten().copied());
+                }
+            }
+            near.sort_unstable();
+            let links = closest_of_each_pass(pose, &near, poses, settings);
+            growing = grow(growing, &links, (run_idx as u32, index as u32), settings, &mut finished);
+        }
+        for (index, pose) in run_poses.iter().enumerate().skip(num_entered) {
+            let cell = (components[run_idx], cell_of(pose.x), cell_of(pose.y));
+            cells.entry(cell).or_default().push((run_idx as u32, index as u32));
+        }
+        finished.extend(growing.iter().map(|growing| growing.stretch));
+    }
+    finished.sort_by_key(|stretch| (stretch.later, stretch.earlier, stretch.direction));
+    finished
+}
+
+/// Of every pass beside a pose the closest observation.
+fn closest_of_each_pass(
+    pose: &Pose2,
+    near: &[(u32, u32)],
+    poses: &[Vec<Pose2>],
+    settings: &StretchSettings,
+) -> Vec<Link> {
+    let mut links: Vec<Link> = Vec::new();
+    let mut best_m = f64::INFINITY;
+    let mut previous: Option<(u32, u32, Direction)> = None;
+    for &(run_idx, observation) in near {
+        let other = &poses[run_idx as usize][observation as usize];
+        let distance_m = pose.distance(other);
+        let apart_rad = angle_between(pose.theta, other.theta);
+        let direction = if apart_rad <= FRAC_PI_4 {
+            Direction::Same
+        } else if apart_rad >= PI - FRAC_PI_4 {
+            Direction::Opposite
+        } else {
+            continue;
+        };
+        if distance_m > settings.distance_m {
+            continue;
+        }
+        let continues = previous
+            .is_some_and(|(run, last, way)| run == run_idx && way == direction && observation - last <= 5);
+        previous = Some((run_idx, observation, direction));
+        let link = Link { run_idx, observation, direction };
+        if !continues {
+            links.push(link);
+            best_m = distance_m;
+        } else if distance_m < best_m {
+            best_m = distance_m;
+            if let Some(last) = links.last_mut() {
+                *last = link;
+            }
+        }
+    }
+    links
+}
+
+/// Lengthens what continues, finishes what does not, begins what is new.
+fn grow(
+    growing: Vec<Growing>,
+    links: &[Link],
+    (run_idx, index): (u32, u32),
+    settings: &StretchSettings,
+    finished: &mut Vec<Stretch>,
+) -> Vec<Growing> {
+    let mut is_used = vec![false; links.len()];
+    let mut alive = Vec::new();
+    for mut old in growing {
+        let next =
+            links.iter().enumerate().find(|(link_idx, link)| !is_used[*link_idx] && continues(&old, link));
+        let length = index - old.stretch.later.first;
+        match next {
+            Some((link_idx, link)) if length < settings.max_observations => {
+                is_used[link_idx] = true;
+                old.stretch.later.last = index;
+                old.stretch.earlier.first = old.stretch.earlier.first.min(link.observation);
+                old.stretch.earlier.last = old.stretch.earlier.last.max(link.observation);
+                old.last = *link;
+                alive.push(old);
+            }
+            _ => finished.push(old.stretch),
+        }
+    }
+    for (link, _) in links.iter().zip(&is_used).filter(|(_, used)| !**used) {
+        let earlier = Interval { run_idx: link.run_idx, first: link.observation, last: link.observation };
+        let later = Interval { run_idx, first: index, last: index };
+        let stretch = Stretch { earlier, later, direction: link.direction };
+        alive.push(Growing { stretch, last: *link });
+    }
+    alive
+}
+
+fn continues(growing: &Growing, link: &Link) -> bool {
+    let last = &growing.last;
+    let advance = i64::from(link.observation) - i64::from(last.observation);
+    let forward = match link.direction {
+        Direction::Same => advance,
+        Direction::Opposite => -advance,
+    };
+    last.run_idx == link.run_idx && last.direction == link.direction && (0..=3).contains(&forward)
+}

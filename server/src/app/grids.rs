@@ -1,0 +1,75 @@
+//! Occupancy grids of map versions: drawn from the stored scans when first asked for, kept while there is room.
+
+use std::sync::{Arc, PoisonError};
+
+use locution_engine::localization::GridMap;
+
+use super::maps::{MapRecord, PlacedRun};
+use super::occupancy::OccupancyCounter;
+use super::site::Site;
+use super::{App, AppError, on_blocking_thread};
+
+/// Edge of a served cell, metres.
+const RESOLUTION_M: f64 = 0.05;
+/// Keyframes read and drawn at once.
+const NUM_KEYFRAMES_PER_STEP: usize = 500;
+
+/// Names a grid in the cache.
+pub(super) type GridKey = (String, u64, u32);
+
+impl App {
+    /// The occupancy grid of one component of a version.
+    ///
+    /// # Errors
+    /// [`AppError::NotFound`] for a component that is not in the map.
+    pub async fn grid(&self, site: &Site, map: &MapRecord, component: u32) -> Result<Arc<GridMap>, AppError> {
+        let key = (site.name().to_string(), map.version, component);
+        if let Some(grid) = self.grids.lock().unwrap_or_else(PoisonError::into_inner).get(&key) {
+            return Ok(Arc::clone(grid));
+        }
+        // One drawing at a time: two requests for the same grid must not draw it twice.
+        let _turn = self.drawing.lock().await;
+        if let Some(grid) = self.grids.lock().unwrap_or_else(PoisonError::into_inner).get(&key) {
+            return Ok(Arc::clone(grid));
+        }
+        let runs = site.placed_runs(map, Some(component)).await?;
+        let grid = draw(site, &runs).await?.ok_or_else(|| AppError::not_found("component", component))?;
+        let grid = Arc::new(grid);
+        self.grids.lock().unwrap_or_else(PoisonError::into_inner).put(key, Arc::clone(&grid));
+        Ok(grid)
+    }
+}
+
+async fn draw(site: &Site, runs: &[PlacedRun]) -> Result<Option<GridMap>, AppError> {
+    let (width_m, height_m) = extent(runs);
+    let mut counter = OccupancyCounter::new(RESOLUTION_M, width_m, height_m);
+    for placed in runs {
+        let geometry = placed.run.geometry.clone();
+        for first in (0..placed.poses.len()).step_by(NUM_KEYFRAMES_PER_STEP) {
+            let range = first..placed.poses.len().min(first + NUM_KEYFRAMES_PER_STEP);
+            let scans = site.keyframe_scans(placed, range.clone()).await?;
+            let poses = placed.poses[range].to_vec();
+            let geometry = geometry.clone();
+            counter = on_blocking_thread(move || {
+                for (pose, scan) in poses.iter().zip(&scans) {
+                    counter.add(&geometry, &pose.map_from_robot, &scan.ranges_m);
+                }
+                counter
+            })
+            .await?;
+        }
+    }
+    on_blocking_thread(move || counter.finish()).await
+}
+
+/// Width and height of the rectangle around all poses, metres.
+fn extent(runs: &[PlacedRun]) -> (f64, f64) {
+    let poses = || runs.iter().flat_map(|run| &run.poses).map(|pose| pose.map_from_robot);
+    let span = |of: fn(&locution_engine::geometry::Pose2) -> f64| {
+        let (min, max) = poses().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), pose| {
+            (min.min(of(&pose)), max.max(of(&pose)))
+        });
+        (max - min).max(0.0)
+    };
+    (span(|pose| pose.x), span(|pose| pose.y))
+}

@@ -1,0 +1,229 @@
+//! `locution eval localization`: robots switched on at random moments of one recording, on the map of another.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use locution_client::{Client, LocalisationState, NewRun, Scan};
+use locution_engine::evaluation::{
+    LocalizationReport, LocalizationTrial, OdometryPose, TrialOutcome, join_truth, judge_localization,
+};
+use locution_engine::formats::{CarmenLog, CarmenOptions};
+use locution_engine::geometry::Pose2;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use serde::Serialize;
+
+use super::local_server::{LocalServer, SITE, build_map};
+use crate::cli::output::write_json;
+use crate::cli::recordings::{Recording, read_recording, read_truth, wire_geometry, wire_scan};
+use crate::cli::upload::{UploadOptions, progress_bar, upload_recording};
+
+/// A start is only fair where the map has been: nearer than this to a mapped place.
+const MAPPED_M: f64 = 2.0;
+
+/// The first truth belongs to the map's recording, the second to the other.
+#[derive(Debug, Args)]
+pub struct LocalizationArguments {
+    /// CARMEN log of which the map is made.
+    #[arg(long)]
+    map_from: PathBuf,
+    /// CARMEN log in which robots are switched on; may be the same file when parts are given.
+    #[arg(long)]
+    log: PathBuf,
+    /// True poses of --map-from, then of --log, in one frame.
+    #[arg(long, required = true, num_args = 1..)]
+    truth: Vec<PathBuf>,
+    /// Part of --map-from that is used, from and to as shares of its scans.
+    #[arg(long, value_delimiter = ',', default_value = "0,1")]
+    map_part: Vec<f64>,
+    /// Part of --log that is used.
+    #[arg(long, value_delimiter = ',', default_value = "0,1")]
+    part: Vec<f64>,
+    /// Number of robots switched on.
+    #[arg(long, default_value_t = 100)]
+    trials: usize,
+    /// A robot that is not sure after driving this far, in metres, is unsure.
+    #[arg(long, default_value_t = 20.0)]
+    metres: f64,
+    /// Chooses the moments.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Write the report here.
+    #[arg(long)]
+    json: Option<PathBuf>,
+}
+
+/// A recording with a true pose for each scan that has one.
+struct Known {
+    recording: Recording,
+    truth: Vec<Option<Pose2>>,
+    travel_m: Vec<f64>,
+}
+
+#[derive(Serialize)]
+struct Report {
+    map_from: String,
+    log: String,
+    #[serde(flatten)]
+    localization: LocalizationReport,
+    seconds: f64,
+}
+
+pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
+    ensure!(arguments.truth.len() == 2, "give --truth twice: of --map-from, then of --log");
+    let map = known(&arguments.map_from, &arguments.truth[0], &arguments.map_part)?;
+    let log = known(&arguments.log, &arguments.truth[1], &arguments.part)?;
+    let began = std::time::Instant::now();
+    let server = LocalServer::start().await?;
+    let mapped = build(&server, &map).await?;
+    let starts = starts(&log, &mapped, arguments);
+    ensure!(
+        !starts.is_empty(),
+        "no scan of the log lies within {MAPPED_M} m of the map with enough driving after it"
+    );
+    let style = ProgressStyle::with_template("{prefix} {bar:32.cyan/white} {pos:>4}/{len}  {msg}")?;
+    let bar = ProgressBar::new(starts.len() as u64).with_style(style).with_prefix("localising");
+    let mut trials = Vec::new();
+    for (idx, &start) in starts.iter().enumerate() {
+        trials.push(trial(&server.client, &log, start, &mapped, arguments.metres).await?);
+        let found = trials.iter().filter(|trial| trial.outcome() == TrialOutcome::Found).count();
+        let wrong = trials.iter().filter(|trial| trial.outcome() == TrialOutcome::WronglySure).count();
+        bar.set_message(format!("{found} found, {wrong} wrongly sure, {} unsure", idx + 1 - found - wrong));
+        bar.inc(1);
+    }
+    bar.finish();
+    let report = Report {
+        map_from: map.recording.name.clone(),
+        log: log.recording.name.clone(),
+        localization: judge_localization(&trials),
+        seconds: began.elapsed().as_secs_f64(),
+    };
+    print_report(&report);
+    if let Some(path) = &arguments.json {
+        write_json(path, &report)?;
+    }
+    server.stop().await
+}
+
+fn known(log: &PathBuf, truth: &PathBuf, part: &[f64]) -> Result<Known> {
+    let &[from, to] = part else { anyhow::bail!("a part is two shares, such as 0,0.5") };
+    ensure!((0.0..=1.0).contains(&from) && from < to && to <= 1.0, "a part is two rising shares of 0 to 1");
+    let mut recording = read_recording(log, CarmenOptions::default())?;
+    let odometry: Vec<OdometryPose> = recording
+        .log
+        .scans
+        .iter()
+        .map(|scan| OdometryPose { timestamp_ns: scan.timestamp_ns, odom_from_robot: scan.odom_from_robot })
+        .collect();
+    let mut truth = join_truth(&odometry, &read_truth(truth)?);
+    let at = |share: f64| (share * odometry.len() as f64).round() as usize;
+    recording.log.scans = recording.log.scans[at(from)..at(to)].to_vec();
+    truth = truth[at(from)..at(to)].to_vec();
+    let travel_m = travel(&recording.log);
+    Ok(Known { recording, truth, travel_m })
+}
+
+fn travel(log: &CarmenLog) -> Vec<f64> {
+    let mut driven_m = 0.0;
+    let mut last: Option<Pose2> = None;
+    log.scans
+        .iter()
+        .map(|scan| {
+            driven_m += last.map_or(0.0, |last| last.distance(&scan.odom_from_robot));
+            last = Some(scan.odom_from_robot);
+            driven_m
+        })
+        .collect()
+}
+
+/// Sends the map's recording and answers pairs of (true, mapped) poses along it.
+async fn build(server: &LocalServer, map: &Known) -> Result<Vec<(Pose2, Pose2)>> {
+    server.client.put_site(SITE, None).await?;
+    let name = map.recording.name.as_str();
+    let bar = progress_bar(&indicatif::MultiProgress::new(), name, map.recording.log.scans.len());
+    let options = UploadOptions::default();
+    upload_recording(&server.client, (SITE, name, name), &map.recording.log, &options, &bar).await?;
+    build_map(server).await?;
+    let trajectory = server.client.trajectory(SITE, name, "map").await?;
+    let pairs = trajectory.poses.iter().filter_map(|pose| {
+        let truth = (*map.truth.get(usize::try_from(pose.scan_seq).ok()?)?)?;
+        Some((truth, Pose2::new(pose.x, pose.y, pose.theta)))
+    });
+    Ok(pairs.collect())
+}
+
+/// Random scans from which a robot can drive far enough, within the mapped area.
+fn starts(log: &Known, mapped: &[(Pose2, Pose2)], arguments: &LocalizationArguments) -> Vec<usize> {
+    let end_m = log.travel_m.last().copied().unwrap_or(0.0);
+    let is_fair = |idx: &usize| {
+        let near = |truth: Pose2| mapped.iter().any(|(known, _)| known.distance(&truth) < MAPPED_M);
+        end_m - log.travel_m[*idx] >= arguments.metres && log.truth[*idx].is_some_and(near)
+    };
+    let fair: Vec<usize> = (0..log.travel_m.len()).filter(is_fair).collect();
+    let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
+    let num_trials = if fair.is_empty() { 0 } else { arguments.trials };
+    (0..num_trials).map(|_| fair[rng.random_range(0..fair.len())]).collect()
+}
+
+/// Switches a robot on at a scan and drives until it is sure or has driven far enough.
+async fn trial(
+    client: &Client,
+    log: &Known,
+    start: usize,
+    mapped: &[(Pose2, Pose2)],
+    limit_m: f64,
+) -> Result<LocalizationTrial> {
+    let recording = &log.recording;
+    let robot = NewRun { robot: "evaluation".into(), geometry: wire_geometry(&recording.log.geometry) };
+    let opened = client.open_localisation(SITE, &robot).await.context("a localisation cannot be opened")?;
+    let mut next = start;
+    let mut answered = None;
+    while answered.is_none() && log.travel_m[next] - log.travel_m[start] < limit_m {
+        // A batch for every half metre, as a robot would send them.
+        let goes_on = |idx: &usize| log.travel_m[*idx] - log.travel_m[next] < 0.5 && idx - next < 200;
+        let end = (next..log.travel_m.len()).take_while(goes_on).count() + next;
+        let geometry = &recording.log.geometry;
+        let scans: Vec<Scan> =
+            recording.log.scans[next..end].iter().map(|scan| wire_scan(geometry, scan)).collect();
+        let answer = client.localise(SITE, &opened.id, (next - start) as u64, &scans).await?;
+        next = end.min(log.travel_m.len() - 1);
+        if answer.state == LocalisationState::Converged {
+            answered = answer.hypotheses.first().map(|best| (end - 1, best.pose));
+        }
+        if end >= log.travel_m.len() {
+            break;
+        }
+    }
+    client.close_localisation(SITE, &opened.id).await?;
+    let last = answered.map_or(next, |(last, _)| last);
+    let truth = log.truth[last].map_or(Pose2::identity(), |truth| expected_pose(&truth, mapped));
+    Ok(LocalizationTrial {
+        answered: answered.map(|(_, pose)| Pose2::new(pose.x, pose.y, pose.theta)),
+        truth,
+        driven_m: log.travel_m[last] - log.travel_m[start],
+    })
+}
+
+/// A true pose in the map's frame, by the nearest mapped place: a map that is bent far away is right here.
+fn expected_pose(truth: &Pose2, mapped: &[(Pose2, Pose2)]) -> Pose2 {
+    let nearest = mapped.iter().min_by(|a, b| a.0.distance(truth).total_cmp(&b.0.distance(truth)));
+    nearest.map_or(*truth, |(known, map_pose)| map_pose.compose(&known.between(truth)))
+}
+
+fn print_report(report: &Report) {
+    let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} m"));
+    let result = &report.localization;
+    println!("\n{} switched on in {} on the map of {}", result.trials, report.log, report.map_from);
+    println!("  found            {}", percent(result.found));
+    println!("  wrongly sure     {}", percent(result.wrongly_sure));
+    println!("  honestly unsure  {}", percent(result.honestly_unsure));
+    println!(
+        "  driven until sure: median {}, nine of ten within {}",
+        metres(result.metres_to_converge.median),
+        metres(result.metres_to_converge.p90)
+    );
+    println!("  time             {:.1} s", report.seconds);
+}

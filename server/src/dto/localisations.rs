@@ -1,0 +1,146 @@
+//! Localisations and queries by example on the wire.
+
+use locution_engine::localization::LocalizationState;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use super::batches::ScanDto;
+use super::common::PoseDto;
+use super::runs::GeometryDto;
+use crate::app::NewBatch;
+use crate::app::localisations::LocalisationInfo;
+use crate::error::ApiError;
+
+/// Opens a localisation; the same body as that of a run.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NewLocalisationDto {
+    /// The robot, for the log.
+    pub robot: Option<String>,
+    /// The laser.
+    pub geometry: GeometryDto,
+}
+
+/// How sure an answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LocalisationStateDto {
+    /// No place of the map explains what is seen.
+    Lost,
+    /// Several places do, or one does not well enough.
+    Ambiguous,
+    /// One place does, and no other.
+    Converged,
+}
+
+impl From<LocalizationState> for LocalisationStateDto {
+    fn from(state: LocalizationState) -> Self {
+        match state {
+            LocalizationState::Lost => Self::Lost,
+            LocalizationState::Ambiguous => Self::Ambiguous,
+            LocalizationState::Converged => Self::Converged,
+        }
+    }
+}
+
+/// A place where the robot may be.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct HypothesisDto {
+    /// The component of the map whose frame the pose is in.
+    pub component: u32,
+    /// Where.
+    pub map_from_robot: PoseDto,
+    /// Covariance of (x, y, θ), row by row.
+    pub covariance: [[f64; 3]; 3],
+    /// Probability; what is missing to 1 is that of being elsewhere.
+    pub probability: f64,
+}
+
+/// A localisation as it stands.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct LocalisationDto {
+    /// Its name.
+    pub id: String,
+    /// The map version it looks in.
+    pub map_version: u64,
+    /// How sure it is.
+    pub state: LocalisationStateDto,
+    /// The sequence number to send next.
+    pub next_sequence: u64,
+    /// Metres driven since it began.
+    pub travel_m: f64,
+    /// Likeliest first.
+    pub hypotheses: Vec<HypothesisDto>,
+}
+
+impl From<LocalisationInfo> for LocalisationDto {
+    fn from(info: LocalisationInfo) -> Self {
+        Self {
+            id: info.id.to_string(),
+            map_version: info.map_version,
+            state: info.state.into(),
+            next_sequence: info.next_sequence,
+            travel_m: info.travel_m,
+            hypotheses: hypotheses_of(&info),
+        }
+    }
+}
+
+fn hypotheses_of(info: &LocalisationInfo) -> Vec<HypothesisDto> {
+    let hypothesis = |found: &crate::app::localisations::LocatedHypothesis| HypothesisDto {
+        component: found.component,
+        map_from_robot: found.map_from_robot.into(),
+        covariance: found.covariance,
+        probability: found.probability,
+    };
+    info.hypotheses.iter().map(hypothesis).collect()
+}
+
+/// A short recording that is asked about and not stored.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ExampleQueryDto {
+    /// The laser.
+    pub geometry: GeometryDto,
+    /// In order of driving; some metres of it.
+    pub scans: Vec<ScanDto>,
+}
+
+impl ExampleQueryDto {
+    /// The scans, checked as those of a batch are.
+    ///
+    /// # Errors
+    /// 422 naming scan and field.
+    pub fn batch(self) -> Result<NewBatch, ApiError> {
+        let scans = self.scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
+        Ok(NewBatch { first_sequence: 0, scans: scans.collect::<Result<_, _>>()? })
+    }
+}
+
+/// Where the example ends, in one site.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ExampleAnswerDto {
+    /// The site.
+    pub site: String,
+    /// The map version looked in.
+    pub map_version: u64,
+    /// `lost` means "not here".
+    pub state: LocalisationStateDto,
+    /// Metres that the example drives.
+    pub travel_m: f64,
+    /// Places where the robot was at the end of the example, likeliest first.
+    pub places: Vec<HypothesisDto>,
+}
+
+impl ExampleAnswerDto {
+    /// The answer of a site.
+    pub fn new(site: String, info: &LocalisationInfo) -> Self {
+        Self {
+            site,
+            map_version: info.map_version,
+            state: info.state.into(),
+            travel_m: info.travel_m,
+            places: hypotheses_of(info),
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! "Where am I": sessions fed with scans, and questions by example.
+
+use axum::extract::State;
+use axum::http::StatusCode;
+use axum::{Extension, Json};
+
+use crate::app::AppError;
+use crate::auth::Identity;
+use crate::dto::batches::BatchDto;
+use crate::dto::localisations::{ExampleAnswerDto, ExampleQueryDto, LocalisationDto, NewLocalisationDto};
+use crate::error::{ApiError, Problem};
+use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
+use crate::state::AppState;
+
+/// Open a localisation in the serving map; nothing of it is stored.
+#[utoipa::path(post, path = "/v1/sites/{site}/localisations", operation_id = "open_localisation",
+    tag = "localisation", params(("site" = String, Path)), request_body = NewLocalisationDto,
+    responses((status = 201, body = LocalisationDto), (status = 404, body = Problem), (status = 409, body = Problem),
+        (status = 429, body = Problem)))]
+pub async fn open_localisation(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    Body(new): Body<NewLocalisationDto>,
+) -> Result<(StatusCode, Json<LocalisationDto>), ApiError> {
+    let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let info = state.app.open_localisation(&site, geometry).await?;
+    Ok((StatusCode::CREATED, Json(info.into())))
+}
+
+/// The answer as it stands.
+#[utoipa::path(get, path = "/v1/sites/{site}/localisations/{id}", operation_id = "get_localisation",
+    tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
+    responses((status = 200, body = LocalisationDto), (status = 404, body = Problem)))]
+pub async fn get_localisation(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    IdOf(id): IdOf,
+) -> Result<Json<LocalisationDto>, ApiError> {
+    Ok(Json(state.app.localisation(&site, id).await?.into()))
+}
+
+/// Feed scans, in the batches of a run, and get the answer after them.
+#[utoipa::path(post, path = "/v1/sites/{site}/localisations/{id}/batches", operation_id = "localise",
+    tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
+    request_body(content((BatchDto = "application/json"), (BatchDto = "application/cbor"))),
+    responses((status = 200, body = LocalisationDto), (status = 404, body = Problem), (status = 409, body = Problem),
+        (status = 422, body = Problem)))]
+pub async fn localise(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    IdOf(id): IdOf,
+    BatchSlot(_slot): BatchSlot,
+    Body(batch): Body<BatchDto>,
+) -> Result<Json<LocalisationDto>, ApiError> {
+    Ok(Json(state.app.localise(&site, id, batch.try_into()?).await?.into()))
+}
+
+/// Close a localisation.
+#[utoipa::path(delete, path = "/v1/sites/{site}/localisations/{id}", operation_id = "close_localisation",
+    tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
+    responses((status = 204), (status = 404, body = Problem)))]
+pub async fn close_localisation(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    IdOf(id): IdOf,
+) -> Result<StatusCode, ApiError> {
+    state.app.close_localisation(&site, id)?;
+    Ok(StatusCode::NO_CONTENT)
+}
+
+/// Where in the site was this recorded? The example is not stored.
+#[utoipa::path(post, path = "/v1/sites/{site}/queries/example", operation_id = "query_example",
+    tag = "localisation", params(("site" = String, Path)),
+    request_body(content((ExampleQueryDto = "application/json"), (ExampleQueryDto = "application/cbor"))),
+    responses((status = 200, body = ExampleAnswerDto), (status = 404, body = Problem), (status = 409, body = Problem),
+        (status = 422, body = Problem)))]
+pub async fn query_example(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    BatchSlot(_slot): BatchSlot,
+    Body(query): Body<ExampleQueryDto>,
+) -> Result<Json<ExampleAnswerDto>, ApiError> {
+    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let info = state.app.find_places(&site, &geometry, query.batch()?).await?;
+    Ok(Json(ExampleAnswerDto::new(site.name().to_string(), &info)))
+}
+
+/// Where was this recorded, of all sites that the key may see? Sites without a map are passed over.
+#[utoipa::path(post, path = "/v1/queries/example", operation_id = "query_example_everywhere", tag = "localisation",
+    request_body(content((ExampleQueryDto = "application/json"), (ExampleQueryDto = "application/cbor"))),
+    responses((status = 200, body = Vec<ExampleAnswerDto>), (status = 422, body = Problem)))]
+pub async fn query_example_everywhere(
+    State(state): State<AppState>,
+    Extension(identity): Extension<Identity>,
+    BatchSlot(_slot): BatchSlot,
+    Body(query): Body<ExampleQueryDto>,
+) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
+    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let batch = query.batch()?;
+    let mut answers = Vec::new();
+    for site in state.app.sites(|name| identity.may_see(name)).await? {
+        match state.app.find_places(&site, &geometry, batch.clone()).await {
+            Ok(info) => answers.push(ExampleAnswerDto::new(site.name().to_string(), &info)),
+            Err(AppError::NotReady { .. }) => {}
+            Err(error) => return Err(error.into()),
+        }
+    }
+    let best = |answer: &ExampleAnswerDto| answer.places.first().map_or(0.0, |place| place.probability);
+    answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
+    Ok(Json(answers))
+}
