@@ -88,11 +88,6 @@ impl Sweep {
             coverage: if all > 0.0 { (known / all).min(1.0) } else { 0.0 },
         }
     }
-
-    /// Mean likelihood code of the ends at a pose, in [0, 1].
-    pub fn fit(&self, map: &ServedMap, map_from_robot: &Pose2) -> f64 {
-        map.likelihood.mean_code(&self.ends, map_from_robot) / 255.0
-    }
 }
 
 /// What a free place counts beside an end: free space fits nearly everywhere inside a building.

@@ -8,7 +8,6 @@ use super::config::MappingConfig;
 use super::place_match::{Channel, Evidence, MatchState, PlaceMatch, Registration};
 use super::run::RunRecord;
 use super::stretches::Stretch;
-use crate::geometry::wrap_angle;
 use crate::text::{Direction, Interval, Observation};
 
 /// Closures by their anchors.
@@ -77,18 +76,6 @@ pub(crate) fn registration_of(set: &AnchorSet, closure: &Closure) -> Registratio
         earlier_from_later: closure.fit.earlier_from_later,
         covariance: closure.fit.covariance.transpose().into(),
         agreement: closure.fit.agreement,
-    }
-}
-
-/// Whether a closure was driven the same or the opposite way; none when the two cross.
-pub(crate) fn direction_of(closure: &Closure) -> Option<Direction> {
-    let apart_rad = wrap_angle(closure.fit.earlier_from_later.theta).abs();
-    if apart_rad <= std::f64::consts::FRAC_PI_4 {
-        Some(Direction::Same)
-    } else if apart_rad >= 3.0 * std::f64::consts::FRAC_PI_4 {
-        Some(Direction::Opposite)
-    } else {
-        None
     }
 }
 
