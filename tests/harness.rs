@@ -205,10 +205,15 @@ const RANGE_MAX_M: f64 = 20.0;
 
 /// The laser of the robot that [`drive`] simulates.
 pub fn geometry() -> Value {
+    geometry_with(NUM_RANGES)
+}
+
+/// The same with another number of beams.
+pub fn geometry_with(num_ranges: usize) -> Value {
     json!({
-        "num_ranges": NUM_RANGES,
+        "num_ranges": num_ranges,
         "angle_min_rad": -PI / 2.0,
-        "angle_increment_rad": PI / (NUM_RANGES - 1) as f64,
+        "angle_increment_rad": PI / (num_ranges - 1) as f64,
         "range_max_m": RANGE_MAX_M,
         "robot_from_laser": {"x": 0.1, "y": 0.0, "theta": 0.0},
     })
@@ -216,15 +221,20 @@ pub fn geometry() -> Value {
 
 /// Scans of a robot that circles through a ring of corridors with alcoves, with noise from a seed.
 pub fn drive(num_scans: usize, seed: u64) -> Vec<Value> {
+    drive_with(num_scans, seed, NUM_RANGES)
+}
+
+/// The same with another number of beams.
+pub fn drive_with(num_scans: usize, seed: u64, num_ranges: usize) -> Vec<Value> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let walls = walls();
     let mut scans = Vec::with_capacity(num_scans);
     let (mut x, mut y, mut theta) = (2.0f64, 1.0f64, 0.0f64);
     for idx in 0..num_scans {
         let laser = (x + 0.1 * theta.cos(), y + 0.1 * theta.sin());
-        let ranges: Vec<Value> = (0..NUM_RANGES)
+        let ranges: Vec<Value> = (0..num_ranges)
             .map(|beam| {
-                let angle = theta - PI / 2.0 + PI * beam as f64 / (NUM_RANGES - 1) as f64;
+                let angle = theta - PI / 2.0 + PI * beam as f64 / (num_ranges - 1) as f64;
                 let range_m = cast(&walls, laser, angle) + rng.random_range(-0.01..0.01);
                 if range_m < RANGE_MAX_M { json!((range_m * 1000.0).round() / 1000.0) } else { Value::Null }
             })

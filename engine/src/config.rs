@@ -5,6 +5,7 @@ use thiserror::Error;
 
 use crate::density::DensityConfig;
 use crate::grid::LocalMapConfig;
+use crate::localization::LocalizationConfig;
 use crate::mapping::MappingConfig;
 use crate::matching::MatchingConfig;
 use crate::registration::RefinerConfig;
@@ -38,6 +39,8 @@ pub struct EngineConfig {
     pub matching: MatchingConfig,
     /// How runs become one map.
     pub mapping: MappingConfig,
+    /// How robots are found in the map.
+    pub localization: LocalizationConfig,
 }
 
 impl EngineConfig {
@@ -49,6 +52,7 @@ impl EngineConfig {
         self.translator.validate("translator")?;
         self.matching.validate("matching")?;
         self.mapping.validate("mapping")?;
+        self.localization.validate("localization")?;
         Ok(())
     }
 }

@@ -15,7 +15,7 @@ use locution_engine::translator::{Translation, Translator};
 use proptest::prelude::*;
 
 /// Largest stored form of an open run, bytes.
-const MAX_STORED_BYTES: usize = 64 * 1024;
+const MAX_STORED_BYTES: usize = 128 << 10;
 
 fn geometry() -> ScanGeometry {
     ScanGeometry {

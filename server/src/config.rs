@@ -79,7 +79,7 @@ impl Default for LimitsConfig {
             num_runs_per_site_max: 10_000,
             odometry_step_max_m: 5.0,
             num_requests_max: 512,
-            num_batches_max: 64,
+            num_batches_max: 32,
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localisations_max: 32,

@@ -78,6 +78,9 @@ fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
 }
 
 fn parse_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
+    if let Ok(value) = ciborium::from_reader(bytes) {
+        return Ok(value);
+    }
     match ciborium::from_reader::<Located<T>, _>(bytes) {
         Ok(Located(value)) => Ok(value),
         Err(ciborium::de::Error::Semantic(_, message)) => match message.split_once(LOCATION_END) {

@@ -106,12 +106,17 @@ async fn cbor_and_compressed_bodies_mean_the_same() {
     let body = json!({"first_sequence": 0, "scans": scans});
     let mut cbor = Vec::new();
     ciborium::into_writer(&body, &mut cbor).unwrap();
+    let mut packed = ciborium::Value::serialized(&body).unwrap();
+    pack_ranges(&mut packed);
+    let mut bytes = Vec::new();
+    ciborium::into_writer(&packed, &mut bytes).unwrap();
     let json = serde_json::to_vec(&body).unwrap();
     let mut gzip = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     gzip.write_all(&json).unwrap();
     let gzip = gzip.finish().unwrap();
     api.make_run("a", "r").await;
-    let forms: [(&[(&str, &str)], Vec<u8>); 3] = [
+    let forms: [(&[(&str, &str)], Vec<u8>); 4] = [
+        (&[("content-type", "application/cbor")], bytes),
         (&[("content-type", "application/cbor")], cbor),
         (&[("content-type", "application/json")], json),
         (&[("content-type", "application/json"), ("content-encoding", "gzip")], gzip),
@@ -124,6 +129,26 @@ async fn cbor_and_compressed_bodies_mean_the_same() {
     assert!(receipts.iter().all(|receipt| *receipt == receipts[0]));
     assert_eq!(receipts[0]["next_sequence"], 60);
     server.stop().await;
+}
+
+/// Turns every list of ranges into a byte string of floats.
+fn pack_ranges(tree: &mut ciborium::Value) {
+    let metres = |value: &ciborium::Value| value.as_float().map_or(f32::NAN, |metres| metres as f32);
+    match tree {
+        ciborium::Value::Map(entries) => {
+            for (key, value) in entries {
+                match (key.as_text(), &value) {
+                    (Some("ranges_m"), ciborium::Value::Array(ranges)) => {
+                        let bytes = ranges.iter().flat_map(|range| metres(range).to_le_bytes()).collect();
+                        *value = ciborium::Value::Bytes(bytes);
+                    }
+                    _ => pack_ranges(value),
+                }
+            }
+        }
+        ciborium::Value::Array(items) => items.iter_mut().for_each(pack_ranges),
+        _ => {}
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]

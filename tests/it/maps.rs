@@ -161,15 +161,17 @@ async fn matches_are_objects_and_decisions_stick() {
             && a["first"].as_u64() <= b["last"].as_u64()
             && b["first"].as_u64() <= a["last"].as_u64()
     };
+    let mut num_same = 0;
     for again in api.all("/v1/sites/a/matches").await {
         let is_same = overlaps(&again["earlier"], &found["earlier"])
             && overlaps(&again["later"], &found["later"])
             && again["direction"] == found["direction"];
         if is_same {
-            assert_eq!(again["decision"], "veto");
-            assert_ne!(again["state"], "verified", "{again}");
+            num_same += 1;
+            assert_eq!((&again["decision"], &again["reason"]), (&json!("veto"), &json!("vetoed")), "{again}");
         }
     }
+    assert!(num_same > 0, "a vetoed pair stays listed");
     let server = server.restart().await;
     let api = &server.api;
     let decided = api.all("/v1/sites/a/matches").await.into_iter().find(|found| found["decision"] == "veto");
@@ -281,8 +283,9 @@ async fn a_grown_site_gets_new_texts_all_at_once() {
     let api = &server.api;
     let [first, second] = ["first", "second"].map(|run| format!("/v1/sites/a/runs/{run}/words"));
     let (first, second) = (api.get_text(&first).await, api.get_text(&second).await);
-    let num_common = first.lines().count() - 1;
-    assert!(num_common > 5);
-    assert!(first.lines().take(num_common - 1).eq(second.lines().take(num_common - 1)));
+    // The shorter run ends with words that knew less of what came; all before are the same.
+    let num_common = first.lines().count().saturating_sub(3);
+    assert!(!first.is_empty() && second.lines().count() > num_common);
+    assert!(first.lines().take(num_common).eq(second.lines().take(num_common)), "{first}\n{second}");
     server.stop().await;
 }

@@ -37,7 +37,7 @@ pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
 pub use localisations::{Hypothesis, Localisation, LocalisationState};
 pub use types::{
-    BatchAnswer, Geometry, Job, MatchInterval, NewRun, Observation, PlaceMatch, Pose, RunStatus, Scan,
-    SiteStatus, StampedPose, Trajectory, Word, WordId,
+    BatchAnswer, Geometry, Job, LabelledStretch, MatchInterval, NewRun, Observation, PlaceMatch, Pose,
+    RunStatus, Scan, SiteStatus, StampedPose, Trajectory, Word, WordId,
 };
 pub use upload::{Encoding, RunUpload};

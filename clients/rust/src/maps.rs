@@ -4,7 +4,7 @@ use reqwest::Method;
 
 use crate::client::{Body, Client};
 use crate::error::ClientError;
-use crate::types::{Job, PlaceMatch};
+use crate::types::{Job, LabelledStretch, PlaceMatch};
 
 impl Client {
     /// All matches of a site that pass the filter, a query such as `state=verified` or nothing.
@@ -73,11 +73,11 @@ impl Client {
         self.json(Method::GET, &format!("/v1/sites/{site}/map"), Body::Empty).await
     }
 
-    /// The labelled places of the map as their JSON document.
+    /// All labelled stretches of driving.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn labels(&self, site: &str) -> Result<serde_json::Value, ClientError> {
-        self.json(Method::GET, &format!("/v1/sites/{site}/labels"), Body::Empty).await
+    pub async fn labels(&self, site: &str) -> Result<Vec<LabelledStretch>, ClientError> {
+        self.all_pages(&format!("/v1/sites/{site}/labels")).await
     }
 }

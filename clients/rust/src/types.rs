@@ -194,6 +194,21 @@ pub struct PlaceMatch {
     pub reason: Option<String>,
 }
 
+/// A stretch of driving through places of one label.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+pub struct LabelledStretch {
+    /// The run that drove it.
+    pub run: String,
+    /// `corridor`, `corner`, `bifurcation`, `dead-end` or `hall`.
+    pub label: String,
+    /// First observation, inclusive.
+    pub first: u64,
+    /// Last observation, inclusive.
+    pub last: u64,
+    /// Share of what was seen that agrees with the label.
+    pub confidence: f64,
+}
+
 /// A pose at the time of a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
 pub struct StampedPose {

@@ -307,10 +307,11 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::*;
+    use crate::density::KernelProfile;
     use crate::geometry::Point2;
     use crate::localization::arc_planes::margin;
     use crate::localization::grid_map::{CellState, GridMap};
-    use crate::localization::kernel_rows::KernelProfile;
+    use crate::localization::kernel_rows::height;
 
     /// Algorithm 3.1, cell by cell.
     fn literal_fill(map: &GridMap, centre: (i64, i64), profile: KernelProfile, h: f64) -> Option<Fill> {
@@ -321,7 +322,7 @@ mod tests {
         let reach = h.ceil() as i64;
         for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy))) {
             let d = (dx as f64).hypot(dy as f64);
-            whole += if d < h { profile.height(d, h) } else { 0.0 };
+            whole += if d < h { height(profile, d, h) } else { 0.0 };
         }
         let mut num_open = 0;
         let mut seen = HashSet::from([centre]);
@@ -334,7 +335,7 @@ mod tests {
             if map.state(x, y) != CellState::Free {
                 continue;
             }
-            mass += profile.height(d, h);
+            mass += height(profile, d, h);
             let around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
             num_open += u32::from(around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown));
             queue.extend(around.iter().filter(|&&cell| seen.insert(cell)));

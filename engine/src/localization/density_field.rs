@@ -16,8 +16,9 @@ use super::bit_window::BitPlanes;
 use super::connected_disc::{DiscSweep, Fill};
 use super::density_gradient::{GradientConfig, stable_descent};
 use super::grid_map::{CellState, GridMap};
-use super::kernel_rows::{KernelProfile, KernelRows};
+use super::kernel_rows::KernelRows;
 use crate::config::ConfigError;
+use crate::density::KernelProfile;
 use crate::geometry::{Point2, Pose2, wrap_angle};
 
 /// Density code of a cell that is not free.

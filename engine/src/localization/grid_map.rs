@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Point2;
+use crate::grid::{Cell, LocalMap};
 
 /// What is known of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +48,26 @@ impl GridMap {
     pub fn unknown(width: usize, height: usize, resolution_m: f64, origin: Point2) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { width, height, resolution_m, origin, cells: vec![CellState::Unknown; width * height] }
+    }
+
+    /// What a robot's local map knows within `radius_m` of the robot, in the frame of that map; None before the first
+    /// scan.
+    pub fn around_robot(local_map: &LocalMap, radius_m: f64) -> Option<Self> {
+        let robot = local_map.robot_cell()?;
+        let resolution_m = local_map.resolution_m();
+        let reach = (radius_m / resolution_m).ceil() as i32;
+        let side = 2 * reach + 1;
+        let corner = Cell { x: robot.x - reach, y: robot.y - reach };
+        let origin = Point2::new(f64::from(corner.x) * resolution_m, f64::from(corner.y) * resolution_m);
+        let state = |cell: i32| {
+            let cell = Cell { x: corner.x + cell % side, y: corner.y + cell / side };
+            match (local_map.is_free(cell), local_map.is_occupied(cell)) {
+                (true, _) => CellState::Free,
+                (false, true) => CellState::Occupied,
+                (false, false) => CellState::Unknown,
+            }
+        };
+        Self::new(side as usize, resolution_m, origin, (0..side * side).map(state).collect())
     }
 
     /// Columns.

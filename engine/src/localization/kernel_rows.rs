@@ -1,30 +1,14 @@
 //! Kernels laid out for floods: the chords of the disc and running sums of the kernel along each (Eqs 2.14–2.16).
 
-use serde::{Deserialize, Serialize};
-
 use super::bit_window::Row;
+use crate::density::KernelProfile;
 
-/// Shape of a kernel; its support is d < h and its discrete sum is 1.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum KernelProfile {
-    /// Every cell counts the same (Eq 2.14).
-    #[default]
-    Uniform,
-    /// Near cells count more, σ = h (Eq 2.15).
-    Gaussian,
-    /// Far cells count more, b = 0.871 c (Eq 2.16).
-    Inverted,
-}
-
-impl KernelProfile {
-    /// Unnormalised height at distance `d` for bandwidth `h`, in the same unit; d < h.
-    pub(super) fn height(self, d: f64, h: f64) -> f64 {
-        match self {
-            Self::Uniform => 1.0,
-            Self::Gaussian => (-0.5 * (d / h).powi(2)).exp(),
-            Self::Inverted => h * 1.871 - (h * h - d * d).sqrt(),
-        }
+/// Unnormalised height of a kernel at distance `d` for bandwidth `h`, in the same unit; d < h.
+pub(super) fn height(profile: KernelProfile, d: f64, h: f64) -> f64 {
+    match profile {
+        KernelProfile::Uniform => 1.0,
+        KernelProfile::Gaussian => (-0.5 * (d / h).powi(2)).exp(),
+        KernelProfile::Inverted => h * 1.871 - (h * h - d * d).sqrt(),
     }
 }
 
@@ -46,17 +30,18 @@ impl KernelRows {
         let half_chords: Vec<Option<usize>> = (0..=radius)
             .map(|dy| (0..=radius).rev().find(|&dx| (dx as f64).hypot(dy as f64) < bandwidth_cells))
             .collect();
-        let height = |dx: i64, dy: i64| {
+        let height_at = |dx: i64, dy: i64| {
             let d = (dx as f64).hypot(dy as f64);
-            if d < bandwidth_cells { profile.height(d, bandwidth_cells) } else { 0.0 }
+            if d < bandwidth_cells { height(profile, d, bandwidth_cells) } else { 0.0 }
         };
         let reach = radius as i64;
-        let sum: f64 = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| height(dx, dy))).sum();
+        let sum: f64 =
+            (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| height_at(dx, dy))).sum();
         let running = (-reach..=reach)
             .map(|dy| {
                 let mut total = 0.0;
                 let sums = (-reach..=reach).map(|dx| {
-                    total += height(dx, dy) / sum;
+                    total += height_at(dx, dy) / sum;
                     total as f32
                 });
                 std::iter::once(0.0).chain(sums).collect()

@@ -67,7 +67,7 @@ impl Default for LocalizerConfig {
             search_every_m: 1.5,
             history_m: 25.0,
             max_points: 80,
-            range_max_m: 30.0,
+            range_max_m: 20.0,
             search_range_m: 12.0,
             evidence_per_scan: 3.0,
             agreement_elsewhere: 0.6,

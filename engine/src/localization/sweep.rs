@@ -127,7 +127,7 @@ pub(super) fn climb(
     };
     let mut best = *start;
     let mut best_worth = worth(start);
-    for scale in [1.0, 0.5, 0.25] {
+    for scale in [1.0, 0.5, 0.25, 0.125] {
         let (step_m, step_rad) = (deviation_m * scale, deviation_rad * scale);
         for _ in 0..4 {
             let moves = [

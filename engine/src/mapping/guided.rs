@@ -28,18 +28,18 @@ pub(crate) struct GuidedRound {
     pub tried: Vec<(usize, usize)>,
 }
 
-/// Registers all neighbours of one graph and keeps the fits that agree with it and with each other.
+/// Registers all neighbours of one graph that may be matched, and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
 /// Whatever the graph cannot solve.
 pub(crate) fn guided_closures(
     set: &AnchorSet,
     graph: &CoarseGraph,
-    components: &[u32],
+    may_match: &impl Fn(usize, usize) -> bool,
     config: &MappingConfig,
     memo: &mut RegistrationMemo,
 ) -> Result<GuidedRound, PoseGraphError> {
-    let neighbours = find_neighbours(set, graph, components, config)?;
+    let neighbours = find_neighbours(set, graph, may_match, config)?;
     let requests: Vec<Request> = neighbours.iter().map(|pair| pair.request).collect();
     let fits = memo.answers(&requests, set, &config.submap);
     let mut closures = Vec::new();
@@ -74,19 +74,16 @@ fn slack() -> Matrix3<f64> {
 fn find_neighbours(
     set: &AnchorSet,
     graph: &CoarseGraph,
-    components: &[u32],
+    may_match: &impl Fn(usize, usize) -> bool,
     config: &MappingConfig,
 ) -> Result<Vec<Neighbours>, PoseGraphError> {
     let reach_m = config.neighbour_distance_m + config.max_search_m;
     let mut solver = graph.covariances()?;
     let mut found = Vec::new();
     for later in 0..set.anchors.len() {
-        let run = set.anchors[later].run_idx as usize;
         let near: Vec<usize> = (0..later)
             .filter(|&earlier| {
-                components[set.anchors[earlier].run_idx as usize] == components[run]
-                    && set.may_match(earlier, later, config.min_gap_m)
-                    && graph.poses[earlier].distance(&graph.poses[later]) < reach_m
+                may_match(earlier, later) && graph.poses[earlier].distance(&graph.poses[later]) < reach_m
             })
             .collect();
         let near = nearest_of_each_pass(&near, |earlier| graph.poses[earlier].distance(&graph.poses[later]));

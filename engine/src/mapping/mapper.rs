@@ -9,6 +9,7 @@ use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
 use super::guided::guided_closures;
 use super::joining::{Hypothesis, hypotheses, judge_join, registered_candidates};
+use super::judgements::Judgements;
 use super::memo::RegistrationMemo;
 use super::place_match::Decision;
 use super::placement::place_observations;
@@ -25,7 +26,7 @@ use crate::pose_graph::PoseGraphError;
 pub fn map_site(
     config: &MappingConfig,
     runs: &[RunRecord<'_>],
-    _decisions: &[Decision],
+    decisions: &[Decision],
     memo: &mut RegistrationMemo,
 ) -> Result<SiteMap, PoseGraphError> {
     memo.prepare(&config.submap);
@@ -33,7 +34,8 @@ pub fn map_site(
     if set.anchors.is_empty() {
         return Ok(SiteMap::default());
     }
-    let mut mapper = Mapper::new(config, runs, &set)?;
+    let judgements = Judgements::new(decisions, runs, &set, config.submap_half_length_m);
+    let mut mapper = Mapper::new(config, runs, &set, &judgements)?;
     mapper.settle(memo)?;
     if runs.len() > 1 {
         mapper.join(memo)?;
@@ -46,6 +48,7 @@ struct Mapper<'a> {
     config: &'a MappingConfig,
     runs: &'a [RunRecord<'a>],
     set: &'a AnchorSet,
+    judgements: &'a Judgements<'a>,
     components: Vec<u32>,
     graph: CoarseGraph,
     closures: Vec<Closure>,
@@ -57,17 +60,24 @@ impl<'a> Mapper<'a> {
         config: &'a MappingConfig,
         runs: &'a [RunRecord<'a>],
         set: &'a AnchorSet,
+        judgements: &'a Judgements<'a>,
     ) -> Result<Self, PoseGraphError> {
         let mut graph = CoarseGraph::new(set, runs, config);
         graph.optimise(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
-        Ok(Self { config, runs, set, components, graph, closures: Vec::new(), tried: Vec::new() })
+        Ok(Self { config, runs, set, judgements, components, graph, closures: Vec::new(), tried: Vec::new() })
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
     fn settle(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        for _round in 0..self.config.max_rounds {
-            let round = guided_closures(self.set, &self.graph, &self.components, self.config, memo)?;
+        for _ in 0..self.config.max_rounds {
+            let may_match = |earlier: usize, later: usize| {
+                self.components[self.set.anchors[earlier].run_idx as usize]
+                    == self.components[self.set.anchors[later].run_idx as usize]
+                    && self.set.may_match(earlier, later, self.config.min_gap_m)
+                    && !self.judgements.forbid(earlier, later)
+            };
+            let round = guided_closures(self.set, &self.graph, &may_match, self.config, memo)?;
             let kept = self.graph.optimise(self.set, &round.closures, self.config)?;
             let found: Vec<Closure> = round
                 .closures
@@ -76,9 +86,6 @@ impl<'a> Mapper<'a> {
                 .filter(|(_, kept)| *kept)
                 .map(|(closure, _)| closure)
                 .collect();
-            if std::env::var("V").is_ok() {
-                eprintln!("round {_round}: closures {} memo {}", found.len(), memo.len());
-            }
             let is_settled = num_changed(&self.closures, &found) * 100 <= found.len();
             self.closures = found;
             self.tried = round.tried;
@@ -96,13 +103,11 @@ impl<'a> Mapper<'a> {
             .into_iter()
             .filter(|candidate| {
                 self.set.anchors[candidate.earlier].run_idx != self.set.anchors[candidate.later].run_idx
+                    && !self.judgements.forbid(candidate.earlier, candidate.later)
             })
             .collect();
         let registered: Vec<Closure> =
             registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
-        if std::env::var("V").is_ok() {
-            eprintln!("join: candidates {} registered {}", across.len(), registered.len());
-        }
         let mut refused: BTreeSet<(u32, u32)> = BTreeSet::new();
         loop {
             let proposals = hypotheses(&registered, self.set, &self.graph, &self.components, self.config);
@@ -149,13 +154,8 @@ impl<'a> Mapper<'a> {
         let holds = num_seeds > 0
             && report.num_anchors >= self.config.min_joining_anchors
             && report.share >= self.config.min_joining_share
-            && report.worst_sd_m <= self.config.max_joining_sd_m;
-        if std::env::var("V").is_ok() {
-            eprintln!(
-                "join {} {} with {} anchors: {report:?} {holds}",
-                proposal.host, proposal.guest, proposal.num_anchors
-            );
-        }
+            && report.worst_sd_m <= self.config.max_joining_sd_m
+            && !self.judgements.contradict(&self.graph.poses, self.config.neighbour_distance_m, is_guest);
         if !holds {
             (self.graph, self.components, self.closures, self.tried) = before;
         }
@@ -176,13 +176,17 @@ impl<'a> Mapper<'a> {
         let settings = StretchSettings {
             distance_m: self.config.beside_m,
             min_gap_m: self.config.min_gap_m,
-            max_observations: 25,
+            max_observations: 15,
         };
         let index: ClosureIndex<'_> =
             self.closures.iter().map(|closure| ((closure.earlier, closure.later), closure)).collect();
         let matches = find_stretches(self.runs, &poses, &components, &settings)
             .iter()
-            .map(|stretch| spatial_match(stretch, self.runs, self.set, &self.graph, &index, self.config))
+            .map(|stretch| {
+                let mut found = spatial_match(stretch, self.runs, self.set, &self.graph, &index, self.config);
+                self.judgements.settle(&mut found);
+                found
+            })
             .collect();
         let num_components = components.iter().max().map_or(0, |last| last + 1);
         SiteMap { matches, runs, num_components }

@@ -8,6 +8,7 @@ mod coarse_graph;
 mod config;
 mod guided;
 mod joining;
+mod judgements;
 mod mapper;
 mod memo;
 mod occupancy;

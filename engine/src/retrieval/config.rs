@@ -6,7 +6,7 @@ use crate::config::ConfigError;
 
 /// How places are retrieved by their density profiles.
 ///
-/// Window lengths, their number of candidates and the cut-off were chosen on `intel`.
+/// Window lengths and the cut-off were chosen by hand with `intel`, `aces`, `mit-killian` and `wean1/3/4` in view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RetrievalConfig {

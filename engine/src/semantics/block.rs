@@ -27,7 +27,6 @@ pub(super) struct Block {
     lower_left: Point2,
     /// Cells along an edge.
     pub side: usize,
-    pub is_free: Vec<bool>,
     /// Distance to the nearest cell that is not free, metres.
     pub clearance_m: Vec<f32>,
     /// Within half a robot's width of a driven path.
@@ -124,7 +123,7 @@ impl<'a> BlockEvidence<'a> {
             resolution_m: config.resolution_m,
             lower_left: self.lower_left,
             side: self.side,
-            is_free,
+
             clearance_m,
             is_driven: self.is_driven,
         }

@@ -63,6 +63,10 @@ pub struct SemanticsConfig {
     pub hall_core_share: f64,
     /// Labels are the majority over this much travel before and after, metres.
     pub smoothing_m: f64,
+    /// Edge of the cells of ground on which the labels of all passes are counted, metres.
+    pub place_cell_m: f64,
+    /// A place has at least this many cells; smaller ones go over to a neighbour.
+    pub place_cells_min: usize,
 }
 
 impl Default for SemanticsConfig {
@@ -93,6 +97,8 @@ impl Default for SemanticsConfig {
             hall_radius_m: 3.0,
             hall_core_share: 0.8,
             smoothing_m: 0.8,
+            place_cell_m: 0.5,
+            place_cells_min: 3,
         }
     }
 }
@@ -137,6 +143,8 @@ impl SemanticsConfig {
             ("hall_radius_m", self.hall_radius_m, 0.5, 10.0),
             ("hall_core_share", self.hall_core_share, 0.0, 1.0),
             ("smoothing_m", self.smoothing_m, 0.0, 10.0),
+            ("place_cell_m", self.place_cell_m, 0.1, 10.0),
+            ("place_cells_min", self.place_cells_min as f64, 0.0, 1000.0),
         ] {
             if !(lowest..=highest).contains(&value) {
                 return Err(ConfigError::new(

@@ -1,4 +1,14 @@
 //! Place labels: corridor, corner, bifurcation, dead-end, hall (thesis chapter 6).
+//!
+//! ```text
+//! observations of one run ─► segments ─► decision tree                        the thesis' way
+//!
+//! runs at their poses in the map ─► blocks of occupancy ─► signature of each position ─► rules ─► labels
+//!                                   (what all runs saw)    (passages that leave it,       (all passes vote)
+//!                                                           bends, driven ways, halls)        │
+//!                                        routes and patterns of places ◄─ places of the map ◄─┘
+//! ```
+//! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it.
 
 mod block;
 mod config;
@@ -6,6 +16,10 @@ mod decision_tree;
 mod flood;
 mod label;
 mod label_map;
+mod outline;
+mod pattern;
+mod places;
+mod route;
 mod rules;
 mod segmentation;
 mod signature;
@@ -14,6 +28,9 @@ pub use config::SemanticsConfig;
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};
 pub use label::PlaceLabel;
 pub use label_map::{DrivenRun, LabelledRun, label_runs};
+pub use pattern::{PatternMatch, PlacePattern, find_pattern};
+pub use places::{Place, PlaceMap, Spot, Visit};
+pub use route::{Route, RouteStep, Turn, route};
 pub use rules::label_of;
 pub use segmentation::{Segment, SegmentationConfig, segments};
 pub use signature::PlaceSignature;

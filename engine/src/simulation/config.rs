@@ -72,6 +72,8 @@ pub struct DriveConfig {
     pub robot_radius_m: f64,
     /// It would rather keep this far, where there is room.
     pub comfort_m: f64,
+    /// It swings from side to side by up to this much, differently every time.
+    pub swing_m: f64,
     /// Top speed.
     pub speed_m_per_s: f64,
     /// How fast it speeds up and slows down.
@@ -87,6 +89,7 @@ impl Default for DriveConfig {
         Self {
             robot_radius_m: 0.25,
             comfort_m: 0.8,
+            swing_m: 0.25,
             speed_m_per_s: 0.7,
             acceleration_m_per_s2: 0.6,
             turn_rate_rad_per_s: 0.8,
@@ -175,6 +178,7 @@ impl SimulationConfig {
             ("people.speed_m_per_s", people.speed_m_per_s),
         ];
         let not_negative = [
+            ("drive.swing_m", drive.swing_m),
             ("laser.range_noise_std_m", laser.range_noise_std_m),
             ("odometry.scale_std", self.odometry.scale_std),
             ("odometry.bend_std_rad_per_m", self.odometry.bend_std_rad_per_m),

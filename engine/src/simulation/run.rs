@@ -8,7 +8,7 @@ use super::config::SimulationConfig;
 use super::drive::drive_along;
 use super::gaussian::standard_normal;
 use super::odometry::DriftingOdometry;
-use super::path::smooth_path;
+use super::path::{smooth_path, sway};
 use super::people::People;
 use super::planner::{PlanError, Planner, WaysFrom};
 use super::ray_cast::cast_scan;
@@ -142,7 +142,7 @@ impl Driver<'_> {
             }
         }
         let mut poses = Vec::new();
-        self.drive(&way, comfort_m, &mut poses);
+        self.drive(&way, comfort_m, &mut poses, rng);
         Ok(poses)
     }
 
@@ -167,7 +167,7 @@ impl Driver<'_> {
             let goal = self.random_goal(&ways, &here, &poses, rng).ok_or(SimulationError::NoRoom)?;
             let way = self.planner.way_to(&ways, &goal)?;
             let from = poses.len();
-            self.drive(&way, comfort_m, &mut poses);
+            self.drive(&way, comfort_m, &mut poses, rng);
             driven_m += poses[from.saturating_sub(1)..]
                 .windows(2)
                 .map(|pair| pair[0].distance(&pair[1]))
@@ -182,13 +182,15 @@ impl Driver<'_> {
         self.config.drive.comfort_m * rng.random_range(0.75..1.25)
     }
 
-    fn drive(&self, way: &[Point2], comfort_m: f64, poses: &mut Vec<Pose2>) {
-        let path = smooth_path(self.world, way, comfort_m);
+    fn drive(&self, way: &[Point2], comfort_m: f64, poses: &mut Vec<Pose2>, rng: &mut impl Rng) {
+        let config = &self.config.drive;
+        let straight = smooth_path(self.world, way, comfort_m);
+        let path = sway(self.world, &straight, (config.swing_m, config.robot_radius_m + 0.1), rng);
         let Some(start) = poses.last().copied().or_else(|| start_pose(&path)) else { return };
         if poses.is_empty() {
             poses.push(start);
         }
-        poses.extend(drive_along(&path, &start, &self.config.drive));
+        poses.extend(drive_along(&path, &start, config));
     }
 
     /// A random place from which at least 5 m can be driven.

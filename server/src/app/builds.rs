@@ -5,12 +5,16 @@ use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::{Decision, Keyframe, MappedRun, RunRecord, SiteMap, map_site};
+use locution_engine::mapping::{
+    Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
+    SiteMap, map_site,
+};
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
 use super::labels::{StoredLabel, label_map};
 use super::maps::WrittenRun;
+use super::matches::holds_for;
 use super::reading::{read_keyframes, read_observations, read_words};
 use super::runs::{RunInfo, read_run};
 use super::site::Site;
@@ -117,6 +121,24 @@ fn written_run(run: &LoadedRun) -> WrittenRun {
     }
 }
 
+/// A vetoed pair of places that the map no longer brings together stays listed, so that it can be taken back.
+fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
+    for decision in decisions.iter().filter(|decision| !decision.is_same_place) {
+        if map.matches.iter().any(|found| holds_for(decision, found)) {
+            continue;
+        }
+        map.matches.push(PlaceMatch {
+            earlier: decision.earlier,
+            later: decision.later,
+            direction: decision.direction,
+            channel: Channel::Spatial,
+            evidence: Evidence::default(),
+            probability: 0.0,
+            state: MatchState::Rejected(RejectionReason::Vetoed),
+        });
+    }
+}
+
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
@@ -132,7 +154,8 @@ async fn map_runs(
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
     let (memo, outcome) = on_blocking_thread(move || {
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|map| {
+        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
+            keep_vetoed_visible(&mut map, &decisions);
             let labels = label_map(&records, &map);
             (map, labels)
         });

@@ -10,8 +10,7 @@ use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
 use locution_engine::localization::{
-    CellState, DensityFieldConfig, GridMap, LikelihoodFieldConfig, LocalizationState, Localizer,
-    LocalizerConfig, ServedMap,
+    CellState, DensityFieldConfig, GridMap, LocalizationState, Localizer, ServedMap,
 };
 use locution_engine::scan::{Scan, ScanGeometry};
 
@@ -261,10 +260,15 @@ impl App {
         }
         let mut components: Vec<u32> = sizes.keys().copied().collect();
         components.sort_by_key(|component| std::cmp::Reverse(sizes[component]));
+        let config = Arc::clone(&site.state().config);
         let mut parts = Vec::new();
         for component in components.into_iter().take(NUM_COMPONENTS_MAX) {
             let served = self.served_map(site, map, component).await?;
-            parts.push((component, served, Localizer::new(geometry.clone(), LocalizerConfig::default())));
+            parts.push((
+                component,
+                served,
+                Localizer::new(geometry.clone(), config.localization.localizer.clone()),
+            ));
         }
         Ok(Search { parts, next_sequence: 0, latest_odom: None })
     }
@@ -282,10 +286,11 @@ impl App {
             return Ok(Arc::clone(served));
         }
         let grid = self.grid(site, map, component).await?;
+        let config = Arc::clone(&site.state().config);
         let served = on_blocking_thread(move || {
             // Sessions weigh places by beam ends; one narrow kernel keeps the unused density field small.
             let density = DensityFieldConfig { bandwidths_m: vec![1.5], ..DensityFieldConfig::default() };
-            ServedMap::build(halved(&grid), &density, &LikelihoodFieldConfig::default())
+            ServedMap::build(halved(&grid), &density, &config.localization.likelihood_field)
         })
         .await?;
         let served = Arc::new(served);

@@ -215,7 +215,8 @@ fn decision_on(decisions: &[Decision], found: &PlaceMatch) -> Option<bool> {
     decisions.iter().rev().find(|decision| holds_for(decision, found)).map(|decision| decision.is_same_place)
 }
 
-fn holds_for(decision: &Decision, found: &PlaceMatch) -> bool {
+/// Whether a decision was made on the pair of places of a match.
+pub(super) fn holds_for(decision: &Decision, found: &PlaceMatch) -> bool {
     decision.direction == found.direction
         && overlap(&decision.earlier, &found.earlier)
         && overlap(&decision.later, &found.later)

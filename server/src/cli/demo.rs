@@ -28,13 +28,21 @@ const SITE: &str = "office";
 const PLAN_PICTURE: &[u8] = include_bytes!("../../worlds/office.png");
 const PLAN_YAML: &str = include_str!("../../worlds/office.yaml");
 
-/// Name, seed and waypoints of each robot. The first knows the west, the second the east, and the third drives round
+/// A simulated robot.
+struct Robot {
+    name: &'static str,
+    seed: u64,
+    /// Metres in the plan's frame.
+    waypoints: &'static [(f64, f64)],
+}
+
+/// The first knows the west, the second the east, and the third drives round
 /// the whole floor the other way.
-const ROBOTS: [(&str, u64, &[(f64, f64)]); 3] = [
-    (
-        "porter-1",
-        11,
-        &[
+const ROBOTS: [Robot; 3] = [
+    Robot {
+        name: "porter-1",
+        seed: 11,
+        waypoints: &[
             (9.5, 13.0),
             (9.5, 24.3),
             (22.6, 24.3),
@@ -49,11 +57,11 @@ const ROBOTS: [(&str, u64, &[(f64, f64)]); 3] = [
             (29.3, 10.7),
             (16.0, 10.7),
         ],
-    ),
-    (
-        "porter-2",
-        12,
-        &[
+    },
+    Robot {
+        name: "porter-2",
+        seed: 12,
+        waypoints: &[
             (41.0, 19.0),
             (34.6, 13.0),
             (38.0, 10.7),
@@ -70,11 +78,11 @@ const ROBOTS: [(&str, u64, &[(f64, f64)]); 3] = [
             (29.3, 10.7),
             (42.0, 10.7),
         ],
-    ),
-    (
-        "cleaner",
-        13,
-        &[
+    },
+    Robot {
+        name: "cleaner",
+        seed: 13,
+        waypoints: &[
             (29.0, 3.0),
             (29.3, 10.7),
             (50.2, 10.7),
@@ -89,7 +97,7 @@ const ROBOTS: [(&str, u64, &[(f64, f64)]); 3] = [
             (9.5, 10.7),
             (9.5, 22.0),
         ],
-    ),
+    },
 ];
 
 /// Runs on a fresh machine, without any file but the binary.
@@ -124,7 +132,7 @@ async fn demo(arguments: &DemoArguments) -> Result<()> {
 
     let simulated = tokio::task::spawn_blocking(simulate).await??;
     let recordings: Vec<Recording> =
-        ROBOTS.iter().zip(&simulated).map(|(robot, run)| recording(robot.0, run)).collect();
+        ROBOTS.iter().zip(&simulated).map(|(robot, run)| recording(robot.name, run)).collect();
     send(&client, &recordings).await?;
     println!("\nBuilding the map …");
     let built = Instant::now();
@@ -165,7 +173,7 @@ fn simulate() -> Result<Vec<SimulatedRun>> {
     let mut config = SimulationConfig::default();
     config.people.num_people = 2;
     let mut runs = Vec::new();
-    for (name, seed, waypoints) in ROBOTS {
+    for Robot { name, seed, waypoints } in ROBOTS {
         let route = Task::Route(waypoints.iter().map(|&(x, y)| Point2::new(x, y)).collect());
         let run = simulate_run(&world, &route, &config, seed)?;
         let poses: Vec<Pose2> = run.truth.iter().map(|pose| pose.truth_from_robot).collect();
@@ -254,6 +262,13 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
     Ok(())
 }
 
+/// Robots that share a frame, with their (estimated, true) poses.
+struct MapPart<'a> {
+    component: u64,
+    names: Vec<&'a str>,
+    pairs: Vec<(Pose2, Pose2)>,
+}
+
 /// Error of the trajectories in one frame; runs of one component of the map share its frame and are judged together.
 async fn trajectory_errors(
     client: &Client,
@@ -261,23 +276,23 @@ async fn trajectory_errors(
     simulated: &[SimulatedRun],
     frame: &str,
 ) -> Result<Vec<(String, TrajectoryError)>> {
-    let mut parts: Vec<(u64, Vec<&str>, Vec<(Pose2, Pose2)>)> = Vec::new();
-    for (idx, (name, run)) in names.iter().zip(simulated).enumerate() {
+    let mut parts: Vec<MapPart<'_>> = Vec::new();
+    for (idx, (&name, run)) in names.iter().zip(simulated).enumerate() {
         let trajectory = client.trajectory(SITE, name, frame).await?;
         let component = trajectory.component.unwrap_or(idx as u64);
         let pairs = trajectory.poses.iter().filter_map(|pose| {
             let truth = run.truth.get(usize::try_from(pose.scan_seq).ok()?)?;
             Some((Pose2::new(pose.x, pose.y, pose.theta), truth.truth_from_robot))
         });
-        match parts.iter_mut().find(|part| part.0 == component) {
+        match parts.iter_mut().find(|part| part.component == component) {
             Some(part) => {
-                part.1.push(name);
-                part.2.extend(pairs);
+                part.names.push(name);
+                part.pairs.extend(pairs);
             }
-            None => parts.push((component, vec![name], pairs.collect())),
+            None => parts.push(MapPart { component, names: vec![name], pairs: pairs.collect() }),
         }
     }
-    Ok(parts.into_iter().map(|(_, names, pairs)| (names.join(" + "), judge_trajectory(&pairs))).collect())
+    Ok(parts.into_iter().map(|part| (part.names.join(" + "), judge_trajectory(&part.pairs))).collect())
 }
 
 async fn write_map(client: &Client, directory: &Path) -> Result<()> {

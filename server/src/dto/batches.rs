@@ -14,6 +14,8 @@ use crate::app::records::Receipt;
 use crate::error::ApiError;
 
 /// Readings in metres; one without a return is null in JSON, null, NaN or ∞ in CBOR, and NaN here.
+///
+/// CBOR may also carry them as one byte string of 32-bit floats, little endian, which is the quickest to read.
 #[derive(Clone, Debug, Default, PartialEq, ToSchema)]
 #[schema(value_type = Vec<Option<f32>>, example = json!([2.31, 2.29, null]))]
 pub struct RangesDto(pub Vec<f32>);
@@ -30,7 +32,7 @@ impl Serialize for RangesDto {
 
 impl<'de> Deserialize<'de> for RangesDto {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_seq(RangesVisitor)
+        deserializer.deserialize_any(RangesVisitor)
     }
 }
 
@@ -51,6 +53,19 @@ impl<'de> Visitor<'de> for RangesVisitor {
         }
         Ok(RangesDto(ranges_m))
     }
+
+    fn visit_bytes<E: serde::de::Error>(self, bytes: &[u8]) -> Result<RangesDto, E> {
+        floats_of(bytes)
+    }
+}
+
+/// Floats out of a byte string.
+fn floats_of<E: serde::de::Error>(bytes: &[u8]) -> Result<RangesDto, E> {
+    let (floats, rest) = bytes.as_chunks();
+    if !rest.is_empty() {
+        return Err(E::invalid_length(bytes.len(), &"four bytes for each reading"));
+    }
+    Ok(RangesDto(floats.iter().map(|four| f32::from_le_bytes(*four)).collect()))
 }
 
 /// One reading, in whatever way the format spells numbers.

@@ -1,6 +1,6 @@
 //! `locution eval localization`: robots switched on at random moments of one recording, on the map of another.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
@@ -107,7 +107,7 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
     server.stop().await
 }
 
-fn known(log: &PathBuf, truth: &PathBuf, part: &[f64]) -> Result<Known> {
+fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
     let &[from, to] = part else { anyhow::bail!("a part is two shares, such as 0,0.5") };
     ensure!((0.0..=1.0).contains(&from) && from < to && to <= 1.0, "a part is two rising shares of 0 to 1");
     let mut recording = read_recording(log, CarmenOptions::default())?;

@@ -3,6 +3,7 @@
 mod corridor_graph;
 mod floor_plan;
 mod icp_baseline;
+mod localization;
 mod published;
 mod scenarios;
 mod text_sweep;
@@ -27,6 +28,9 @@ use text_sweep::{FoundChain, Texts, at_threshold, chains_of, sweep, thesis_trans
 /// Which part of the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Chapter {
+    /// Particles weighed by densities: Figures 3.5 and 3.6.
+    #[value(name = "3")]
+    Localization,
     /// n-grams of words in static buildings: Figure 4.12, Table 4.2.
     #[value(name = "4")]
     Static,
@@ -51,6 +55,9 @@ pub struct ThesisArguments {
     /// Leave out the ICP baseline, which takes most of the time.
     #[arg(long)]
     without_icp: bool,
+    /// Seeds of each particle filter of chapter 3 (thesis: 15).
+    #[arg(long, default_value_t = 15)]
+    seeds: u64,
 }
 
 /// One row of a table: what, and precision and recall.
@@ -71,11 +78,16 @@ pub(super) fn run(arguments: &ThesisArguments) -> Result<()> {
     std::fs::create_dir_all(&arguments.out)
         .with_context(|| format!("cannot make {}", arguments.out.display()))?;
     let published = Published::load(arguments.published.as_deref());
+    let is_wanted = |chapter| arguments.chapter.is_none_or(|only| only == chapter);
+    if is_wanted(Chapter::Localization) {
+        let results = localization::chapter_3(&arguments.out, arguments.seeds.max(1))?;
+        write_json(&arguments.out.join("thesis_localization.json"), &results)?;
+    }
     let mut measured = Vec::new();
-    if arguments.chapter != Some(Chapter::Changing) {
+    if is_wanted(Chapter::Static) {
         measured.extend(chapter_4(arguments, &published)?);
     }
-    if arguments.chapter != Some(Chapter::Static) {
+    if is_wanted(Chapter::Changing) {
         measured.extend(chapter_5(arguments, &published)?);
     }
     write_json(&arguments.out.join("thesis.json"), &measured)
@@ -214,9 +226,9 @@ fn chapter_5(arguments: &ThesisArguments, published: &Published) -> Result<Vec<M
     Ok(measured)
 }
 
-/// Single level against two levels: level 0 with a fixed threshold, level 1 with all.
+/// Single level against two levels: level 0 with a fixed threshold, level 1 with all from 3 words on.
 fn figures_5_9_and_5_10(out: &Path, scenario: &Scenario, texts: &Texts) -> Result<()> {
-    let two_levels = MatchingConfig { min_chain_words: vec![1, 1], ..MatchingConfig::default() };
+    let two_levels = MatchingConfig { min_chain_words: vec![2, 3], ..MatchingConfig::default() };
     let (chains, _) = chains_of(texts, &two_levels);
     let words = |found: &FoundChain| found.chain.pairs.len();
     let single = sweep(texts, &chains, |chain| (chain.max_level == 0).then_some(chain.pairs.len() as f64));

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result};
-use locution_engine::config::TranslatorConfig;
+use locution_engine::config::{OdometrySource, TranslatorConfig};
 use locution_engine::density::KernelConfig;
 use locution_engine::evaluation::{
     CurvePoint, JudgedMatch, JudgedRun, OdometryPose, Visit, join_truth, judge_recognition,
@@ -30,7 +30,7 @@ pub(super) struct Texts {
 
 /// The thesis' own translation: one uniform kernel, observed at once, nothing refined.
 pub(super) fn thesis_translator(bandwidth_m: f64) -> TranslatorConfig {
-    let mut config = TranslatorConfig::default();
+    let mut config = TranslatorConfig { odometry: OdometrySource::Raw, ..TranslatorConfig::default() };
     config.density.kernels = vec![KernelConfig::uniform(bandwidth_m)];
     config.sampling.delay_m = 0.0;
     config

@@ -1,0 +1,199 @@
+//! Maps of simulated runs: robots that never met share a frame, look-alikes do not, and a person's word holds.
+
+#![allow(clippy::unwrap_used)]
+
+use locution_engine::config::EngineConfig;
+use locution_engine::geometry::{Point2, Pose2, wrap_angle};
+use locution_engine::mapping::{
+    Decision, Keyframe, MatchState, RegistrationMemo, RejectionReason, RunRecord, SiteMap, map_site,
+    place_in_map,
+};
+use locution_engine::scan::ScanGeometry;
+use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
+use locution_engine::text::{Observation, Word};
+use locution_engine::translator::Translator;
+
+/// A run as the map builder sees it, with the truth of the simulator.
+struct Driven {
+    geometry: ScanGeometry,
+    observations: Vec<Observation>,
+    words: Vec<Word>,
+    keyframes: Vec<Keyframe>,
+    simulated: SimulatedRun,
+}
+
+impl Driven {
+    fn new(world: &World, waypoints: &[(f64, f64)], seed: u64) -> Self {
+        let task = Task::Route(waypoints.iter().map(|&(x, y)| Point2::new(x, y)).collect());
+        let simulated = simulate_run(world, &task, &SimulationConfig::default(), seed).unwrap();
+        let config = EngineConfig::default().translator;
+        let mut translator = Translator::new(&config, simulated.geometry.clone()).unwrap();
+        let (mut observations, mut words, mut keyframes) = (Vec::new(), Vec::new(), Vec::new());
+        let mut take = |translation: locution_engine::translator::Translation| {
+            observations.extend(translation.observations);
+            words.extend(translation.words);
+            if let Some(pose) = translation.keyframe {
+                keyframes.push(Keyframe {
+                    scan_seq: pose.scan_seq,
+                    timestamp_ns: pose.timestamp_ns,
+                    odom_from_robot: pose.odom_from_robot,
+                    run_from_robot: pose.run_from_robot,
+                    motion_covariance: pose.motion_covariance,
+                    ranges_m: simulated.scans[pose.scan_seq as usize].ranges_m.clone(),
+                });
+            }
+        };
+        for scan in &simulated.scans {
+            take(translator.push(scan));
+        }
+        take(translator.finish());
+        Self { geometry: simulated.geometry.clone(), observations, words, keyframes, simulated }
+    }
+
+    fn record(&self) -> RunRecord<'_> {
+        RunRecord {
+            geometry: &self.geometry,
+            observations: &self.observations,
+            words: &self.words,
+            keyframes: &self.keyframes,
+        }
+    }
+
+    fn world_from(&self, keyframe_idx: usize) -> Pose2 {
+        self.simulated.truth[self.keyframes[keyframe_idx].scan_seq as usize].truth_from_robot
+    }
+}
+
+fn mapped(runs: &[&Driven], decisions: &[Decision], memo: &mut RegistrationMemo) -> SiteMap {
+    let records: Vec<RunRecord<'_>> = runs.iter().map(|run| run.record()).collect();
+    map_site(&EngineConfig::default().mapping, &records, decisions, memo).unwrap()
+}
+
+/// A corridor round a block, 30 m × 20 m, with niches and side rooms that make every part of it its own.
+fn ring_world() -> World {
+    let rooms = [
+        (1.0, 1.0, 29.0, 3.0),
+        (1.0, 17.0, 29.0, 19.0),
+        (1.0, 1.0, 3.0, 19.0),
+        (27.0, 1.0, 29.0, 19.0),
+        (6.0, 3.0, 7.2, 7.0),
+        (10.0, 3.0, 15.0, 8.0),
+        (19.0, 15.0, 20.0, 17.0),
+        (22.0, 12.0, 26.0, 17.0),
+        (3.0, 10.0, 5.5, 11.5),
+        (24.0, 5.0, 27.0, 6.0),
+    ];
+    world(&rooms)
+}
+
+/// A corridor of the same width with other corners and other rooms.
+fn other_world() -> World {
+    world(&[
+        (1.0, 1.0, 29.0, 3.0),
+        (13.0, 1.0, 15.0, 19.0),
+        (4.0, 3.0, 9.0, 5.0),
+        (15.0, 9.0, 24.0, 13.0),
+        (18.0, 3.0, 19.0, 6.0),
+    ])
+}
+
+fn world(rooms: &[(f64, f64, f64, f64)]) -> World {
+    let (width, height, resolution_m) = (600, 400, 0.05);
+    let mut is_free = vec![false; width * height];
+    for &(x0, y0, x1, y1) in rooms {
+        for y in (y0 / resolution_m) as usize..(y1 / resolution_m) as usize {
+            for x in (x0 / resolution_m) as usize..(x1 / resolution_m) as usize {
+                is_free[y * width + x] = true;
+            }
+        }
+    }
+    World::new(width, height, resolution_m, Point2::new(0.0, 0.0), is_free).unwrap()
+}
+
+fn two_robots() -> (Driven, Driven) {
+    let world = ring_world();
+    let once_round = [(4.0, 2.0), (27.5, 2.0), (28.0, 18.0), (2.0, 18.0), (2.0, 2.0), (14.0, 2.0)];
+    let other_way = [(25.0, 18.0), (28.0, 16.0), (28.0, 2.0), (2.0, 2.0), (2.0, 14.0)];
+    (Driven::new(&world, &once_round, 3), Driven::new(&world, &other_way, 4))
+}
+
+#[test]
+fn robots_that_never_met_share_a_frame_until_a_person_parts_them() {
+    let (first, second) = two_robots();
+    let runs = [&first, &second];
+    let mut memo = RegistrationMemo::default();
+    let map = mapped(&runs, &[], &mut memo);
+    assert_eq!(map.num_components, 1);
+
+    // Where the second robot is, seen from the beginning of the first, is where it truly was.
+    let map_from_world = map.runs[0].map_from_keyframes[0].compose(&first.world_from(0).inverse());
+    for (keyframe_idx, map_from_robot) in map.runs[1].map_from_keyframes.iter().enumerate() {
+        let expected = map_from_world.compose(&second.world_from(keyframe_idx));
+        assert!(map_from_robot.distance(&expected) < 0.3, "{map_from_robot:?} should be {expected:?}");
+        assert!(wrap_angle(map_from_robot.theta - expected.theta).abs() < 0.05);
+    }
+
+    let across = |map: &SiteMap| {
+        map.matches.iter().find(|found| found.earlier.run_idx != found.later.run_idx).cloned()
+    };
+    let found = across(&map).unwrap();
+    assert_eq!(found.state, MatchState::Verified);
+    let word = |is_same_place| Decision {
+        earlier: found.earlier,
+        later: found.later,
+        direction: found.direction,
+        is_same_place,
+    };
+    assert_eq!(mapped(&runs, &[word(false)], &mut memo).num_components, 2);
+    let confirmed = mapped(&runs, &[word(false), word(true)], &mut memo);
+    // Both words stand; the veto keeps the frames apart, the latest word settles the match where it is listed.
+    assert!(across(&confirmed).is_none_or(|found| found.state == MatchState::Verified));
+}
+
+#[test]
+fn a_veto_within_a_run_is_listed_as_such() {
+    let (first, _) = two_robots();
+    let mut memo = RegistrationMemo::default();
+    let map = mapped(&[&first], &[], &mut memo);
+    let found = map.matches.iter().find(|found| found.state == MatchState::Verified).unwrap().clone();
+    let veto = Decision {
+        earlier: found.earlier,
+        later: found.later,
+        direction: found.direction,
+        is_same_place: false,
+    };
+    let again = mapped(&[&first], &[veto], &mut memo);
+    let listed = again.matches.iter().filter(|other| {
+        other.direction == found.direction
+            && other.earlier.first <= found.earlier.last
+            && found.earlier.first <= other.earlier.last
+            && other.later.first <= found.later.last
+            && found.later.first <= other.later.last
+    });
+    assert!(listed.clone().all(|other| other.state == MatchState::Rejected(RejectionReason::Vetoed)));
+}
+
+#[test]
+fn different_buildings_stay_apart() {
+    let here = two_robots().0;
+    let route = [(2.0, 2.0), (13.0, 2.0), (14.0, 17.0), (14.0, 3.0), (28.0, 2.0)];
+    let there = Driven::new(&other_world(), &route, 5);
+    let map = mapped(&[&here, &there], &[], &mut RegistrationMemo::default());
+    assert_eq!(map.num_components, 2);
+    assert!(map.matches.iter().all(|found| found.earlier.run_idx == found.later.run_idx));
+}
+
+#[test]
+fn what_the_memo_holds_does_not_change_the_map() {
+    let (first, second) = two_robots();
+    let mut memo = RegistrationMemo::default();
+    mapped(&[&second], &[], &mut memo);
+    mapped(&[&first, &second], &[], &mut memo);
+    let remembered = mapped(&[&first, &second], &[], &mut memo);
+    assert_eq!(remembered, mapped(&[&first, &second], &[], &mut RegistrationMemo::default()));
+    assert_eq!(mapped(&[], &[], &mut memo), SiteMap::default());
+    let last = first.keyframes.last().unwrap();
+    assert!(
+        place_in_map(&first.keyframes, &remembered.runs[0], last.scan_seq, &last.run_from_robot).is_some()
+    );
+}
