@@ -95,8 +95,14 @@ impl GraphLines {
             let (Ok(i), Ok(j)) = (index_of(edge.i), index_of(edge.j)) else { continue };
             let information = InformationMatrix::try_new(edge.information)
                 .map_err(|error| at_line(&format!("information: {error}")))?;
+            // The formats do not say what an edge is; between consecutive vertices it is odometry.
             let constraint = PoseConstraint { i, j, i_from_j: edge.i_from_j, information };
-            graph.add_constraint(constraint).map_err(|error| match error {
+            let added = if edge.i.abs_diff(edge.j) == 1 {
+                graph.add_constraint(constraint)
+            } else {
+                graph.add_doubtful(constraint)
+            };
+            added.map_err(|error| match error {
                 PoseGraphError::SelfConstraint { .. } => at_line(&"the edge joins a vertex to itself"),
                 PoseGraphError::MeasurementNotFinite { .. } => at_line(&"the measurement is not finite"),
                 other => at_line(&other),

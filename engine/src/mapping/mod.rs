@@ -2,6 +2,7 @@
 
 mod anchors;
 mod candidates;
+mod changes;
 mod claims;
 mod coarse_graph;
 mod config;
@@ -10,15 +11,18 @@ mod joining;
 mod judgements;
 mod mapper;
 mod memo;
+mod occupancy;
 mod place_match;
 mod placement;
 mod run;
 mod site_map;
 mod stretches;
 
+pub use changes::{Change, ChangeKind, ChangesConfig, PlacedRun, find_changes};
 pub use config::MappingConfig;
 pub use mapper::map_site;
 pub use memo::RegistrationMemo;
+pub use occupancy::{CellBounds, CellCounts, CellIndex, OccupancyConfig, TiledOccupancy};
 pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
 pub use placement::{place_in_map, place_observations};
 pub use run::{Keyframe, RunRecord};

@@ -6,6 +6,16 @@ use crate::geometry::Pose2;
 /// Indices are stored in 32 bits, and three unknowns per pose must still fit.
 const MAX_ITEMS: usize = (u32::MAX / 16) as usize;
 
+/// Whether a constraint may be wrong altogether.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Trust {
+    /// Motion measured between consecutive poses: noisy, never wrong.
+    #[default]
+    Trusted,
+    /// A claim that two places are one: robust optimisation may reject it.
+    Doubtful,
+}
+
 /// A measured relative pose ⟨z, Ω⟩ between two poses (an arc of thesis 2.1.3).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseConstraint {
@@ -26,6 +36,7 @@ pub struct PoseConstraint {
 pub struct PoseGraph {
     poses: Vec<Pose2>,
     constraints: Vec<PoseConstraint>,
+    trusts: Vec<Trust>,
     held: Vec<u32>,
 }
 
@@ -51,11 +62,23 @@ impl PoseGraph {
         Ok(index as u32)
     }
 
-    /// Adds a constraint and returns its index.
+    /// Adds a trusted constraint and returns its index.
     ///
     /// # Errors
     /// `UnknownPose`, `SelfConstraint`, `MeasurementNotFinite`, `TooLarge`.
     pub fn add_constraint(&mut self, constraint: PoseConstraint) -> Result<u32, PoseGraphError> {
+        self.add(constraint, Trust::Trusted)
+    }
+
+    /// Adds a constraint that robust optimisation may reject, and returns its index.
+    ///
+    /// # Errors
+    /// As [`PoseGraph::add_constraint`].
+    pub fn add_doubtful(&mut self, constraint: PoseConstraint) -> Result<u32, PoseGraphError> {
+        self.add(constraint, Trust::Doubtful)
+    }
+
+    fn add(&mut self, constraint: PoseConstraint, trust: Trust) -> Result<u32, PoseGraphError> {
         let index = self.constraints.len();
         self.check_pose(constraint.i)?;
         self.check_pose(constraint.j)?;
@@ -69,6 +92,7 @@ impl PoseGraph {
             return Err(PoseGraphError::TooLarge { limit: MAX_ITEMS });
         }
         self.constraints.push(constraint);
+        self.trusts.push(trust);
         Ok(index as u32)
     }
 
@@ -107,6 +131,11 @@ impl PoseGraph {
         &self.constraints
     }
 
+    /// For every constraint whether robust optimisation may reject it.
+    pub fn trusts(&self) -> &[Trust] {
+        &self.trusts
+    }
+
     /// Indices of the held poses, ascending.
     pub fn held(&self) -> &[u32] {
         &self.held
@@ -122,6 +151,17 @@ impl PoseGraph {
     pub fn constraint_chi2(&self, constraint: u32) -> Option<f64> {
         let constraint = self.constraints.get(constraint as usize)?;
         Some(residual::constraint_chi2(&self.poses, constraint))
+    }
+
+    /// The same poses with only the constraints that `is_kept` names by index.
+    pub fn with_constraints(&self, is_kept: impl Fn(usize) -> bool) -> PoseGraph {
+        let kept = || (0..self.constraints.len()).filter(|&index| is_kept(index));
+        PoseGraph {
+            poses: self.poses.clone(),
+            constraints: kept().map(|index| self.constraints[index]).collect(),
+            trusts: kept().map(|index| self.trusts[index]).collect(),
+            held: self.held.clone(),
+        }
     }
 
     pub(super) fn check_pose(&self, pose: u32) -> Result<(), PoseGraphError> {

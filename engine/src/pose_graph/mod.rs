@@ -10,12 +10,15 @@
 //! ```
 //!
 //! Only relative poses are measured, so one pose of every connected component is held where it stands: the limit
-//! of the prior that Appendix B adds to the first node, without changing the cost. Nothing here knows of scans or
+//! of the prior that Appendix B adds to the first node, without changing the cost. Constraints
+//! that may be wrong altogether are weighed by [`optimize_robust`]. Nothing here knows of scans or
 //! words, and no input can make it panic: a graph that cannot be solved is a [`PoseGraphError`].
 
 mod chordal;
+mod clique;
 mod components;
 mod config;
+mod consistency;
 mod covariance;
 mod error;
 mod graph;
@@ -23,16 +26,20 @@ mod information;
 mod normal_equations;
 mod optimizer;
 mod residual;
+mod robust;
 mod spanning_tree;
 mod sparse_cholesky;
+mod support;
 #[cfg(test)]
 mod testing;
 
 pub use components::Components;
-pub use config::{Method, PoseGraphConfig, Start};
+pub use config::{Kernel, Method, PoseGraphConfig, RobustConfig, Start};
+pub use consistency::{ConsistencyConfig, ConsistentSet, consistent_sets};
 pub use covariance::CovarianceSolver;
 pub use error::PoseGraphError;
-pub use graph::{PoseConstraint, PoseGraph};
+pub use graph::{PoseConstraint, PoseGraph, Trust};
 pub use information::{InformationError, InformationMatrix};
 pub use optimizer::{OptimizeReport, StopReason, optimize};
+pub use robust::{RobustReport, optimize_robust};
 pub use spanning_tree::spanning_tree_start;

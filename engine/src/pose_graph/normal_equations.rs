@@ -101,10 +101,20 @@ pub(super) struct NormalEquations<const D: usize> {
 impl<const D: usize> NormalEquations<D> {
     /// Lays the blocks out and analyses the pattern.
     pub fn new(pattern: &BlockPattern, constraints: &[PoseConstraint]) -> Result<Self, PoseGraphError> {
+        Self::with_columns(pattern, constraints, false)
+    }
+
+    /// As [`NormalEquations::new`], `by_columns` in the layout that [`NormalEquations::inverse_diagonal`] needs.
+    pub fn with_columns(
+        pattern: &BlockPattern,
+        constraints: &[PoseConstraint],
+        by_columns: bool,
+    ) -> Result<Self, PoseGraphError> {
         let num_poses = pattern.num_poses();
         let upper_blocks = compress(num_poses, pattern.couplings.iter().copied());
         let upper = scalar_pattern::<D>(&upper_blocks, Triangle::Upper);
-        let cholesky = SparseCholesky::analyze(&upper).map_err(|_| PoseGraphError::OutOfMemory)?;
+        let cholesky =
+            SparseCholesky::analyze(&upper, by_columns).map_err(|_| PoseGraphError::OutOfMemory)?;
         let triangle = cholesky.triangle();
         let (blocks, scalar_pattern) = match triangle {
             Triangle::Upper => (upper_blocks, upper),
@@ -218,6 +228,18 @@ impl<const D: usize> NormalEquations<D> {
     pub fn inverse_block(&self, columns: &InverseColumns<D>, pose: usize) -> SMatrix<f64, D, D> {
         let first = D * self.position_of[pose] as usize;
         SMatrix::from_fn(|row, k| columns.columns[k * columns.num_unknowns + first + row])
+    }
+
+    /// Diagonal blocks of H⁻¹ for all poses; `None` unless laid out by columns.
+    pub fn inverse_diagonal(&self) -> Option<Vec<SMatrix<f64, D, D>>> {
+        let inverse = self.cholesky.inverse_on_pattern()?;
+        let block = |&position: &u32| {
+            let first = D * position as usize;
+            let entry =
+                |row: usize, column: usize| inverse.get(first + row.max(column), first + row.min(column));
+            SMatrix::from_fn(|row, column| entry(row, column).unwrap_or_default())
+        };
+        Some(self.position_of.iter().map(block).collect())
     }
 
     pub fn is_held(&self, pose: usize) -> bool {

@@ -91,8 +91,16 @@ pub(super) struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     pub fn new(graph: &'a PoseGraph, components: &Components) -> Result<Self, PoseGraphError> {
+        Self::with_columns(graph, components, false)
+    }
+
+    fn with_columns(
+        graph: &'a PoseGraph,
+        components: &Components,
+        by_columns: bool,
+    ) -> Result<Self, PoseGraphError> {
         let pattern = BlockPattern::new(graph.constraints(), held_poses(graph, components))?;
-        let system = NormalEquations::new(&pattern, graph.constraints())?;
+        let system = NormalEquations::with_columns(&pattern, graph.constraints(), by_columns)?;
         Ok(Self {
             pattern,
             constraints: graph.constraints().iter().map(PreparedConstraint::new).collect(),
@@ -246,11 +254,15 @@ impl<'a> Problem<'a> {
         }
     }
 
-    /// The linear system at the present poses, factorised.
-    pub fn into_factorized(mut self) -> Result<NormalEquations<3>, PoseGraphError> {
-        self.linearize();
-        self.system.factorize()?;
-        Ok(self.system)
+    /// The linear system of a graph at its present poses, factorised by columns.
+    pub fn factorized(
+        graph: &'a PoseGraph,
+        components: &Components,
+    ) -> Result<NormalEquations<3>, PoseGraphError> {
+        let mut problem = Self::with_columns(graph, components, true)?;
+        problem.linearize();
+        problem.system.factorize()?;
+        Ok(problem.system)
     }
 }
 

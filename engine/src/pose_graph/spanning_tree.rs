@@ -1,13 +1,13 @@
 //! First guesses for poses that have none, by chaining measurements.
 
 use super::components::DisjointSets;
-use super::{PoseConstraint, PoseGraph};
+use super::{PoseConstraint, PoseGraph, Trust};
 use crate::geometry::Pose2;
 
 /// Places the poses that are not `is_known` by chaining constraints from those that are.
 ///
-/// The chain prefers constraints between consecutive poses, which are odometry, and then the order in which they
-/// were added. A component without a known pose begins with its first pose at the identity.
+/// The chain prefers trusted constraints, and then the order in which they were added. A component without a known
+/// pose begins with its first pose at the identity.
 pub fn spanning_tree_start(graph: &mut PoseGraph, is_known: &[bool]) {
     let tree = spanning_tree(graph);
     let mut poses = graph.poses().to_vec();
@@ -29,11 +29,9 @@ pub fn spanning_tree_start(graph: &mut PoseGraph, is_known: &[bool]) {
 fn spanning_tree(graph: &PoseGraph) -> Vec<Vec<u32>> {
     let mut sets = DisjointSets::new(graph.poses().len());
     let mut tree = vec![Vec::new(); graph.poses().len()];
-    for consecutive in [true, false] {
+    for trust in [Trust::Trusted, Trust::Doubtful] {
         for (index, constraint) in graph.constraints().iter().enumerate() {
-            if (constraint.i.abs_diff(constraint.j) == 1) == consecutive
-                && sets.union(constraint.i, constraint.j)
-            {
+            if graph.trusts()[index] == trust && sets.union(constraint.i, constraint.j) {
                 tree[constraint.i as usize].push(index as u32);
                 tree[constraint.j as usize].push(index as u32);
             }

@@ -6,11 +6,11 @@
 
 use faer::dyn_stack::{MemBuffer, MemStack, StackReq};
 use faer::linalg::cholesky::llt::factor::LltError;
-use faer::sparse::linalg::amd;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky,
 };
+use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
@@ -71,12 +71,17 @@ pub(super) struct SparseCholesky {
 
 impl SparseCholesky {
     /// Analyses a pattern given as its upper triangle, already in elimination order.
-    pub fn analyze(upper: &SymbolicSparseColMat<u32>) -> Result<Self, FactorError> {
+    ///
+    /// Dense blocks of columns are used where they pay, unless `by_columns` asks for plain columns, which
+    /// [`SparseCholesky::inverse_on_pattern`] needs.
+    pub fn analyze(upper: &SymbolicSparseColMat<u32>, by_columns: bool) -> Result<Self, FactorError> {
+        let threshold =
+            if by_columns { SupernodalThreshold::FORCE_SIMPLICIAL } else { SupernodalThreshold::AUTO };
         let symbolic = factorize_symbolic_cholesky(
             upper.as_ref(),
             Side::Upper,
             SymmetricOrdering::Identity,
-            CholeskySymbolicParams::default(),
+            CholeskySymbolicParams { supernodal_flop_ratio_threshold: threshold, ..Default::default() },
         )
         .map_err(|_| FactorError::OutOfMemory)?;
         let request = StackReq::or(
@@ -135,6 +140,64 @@ impl SparseCholesky {
             Par::Seq,
             MemStack::new(&mut self.memory),
         );
+    }
+
+    /// The entries of the inverse where the factor has entries (Takahashi's recursion); `None` unless the analysis
+    /// was asked for plain columns. Costs about as much as the factorisation, whatever the number of unknowns.
+    pub fn inverse_on_pattern(&self) -> Option<SelectedInverse<'_>> {
+        let SymbolicCholeskyRaw::Simplicial(columns) = self.symbolic.raw() else { return None };
+        let (starts, rows) = (columns.col_ptr(), columns.row_idx());
+        let num_unknowns = columns.ncols();
+        let mut inverse = vec![0.0; self.factor.len()];
+        // Place of a row within the column at hand; 0 where it has no entry.
+        let mut place = vec![0usize; num_unknowns];
+        let mut sums: Vec<f64> = Vec::new();
+        for column in (0..num_unknowns).rev() {
+            let (start, end) = (starts[column] as usize, starts[column + 1] as usize);
+            let (below, factor) = (&rows[start + 1..end], &self.factor[start + 1..end]);
+            sums.clear();
+            sums.resize(below.len() + 1, 0.0);
+            for (index, &row) in below.iter().enumerate() {
+                place[row as usize] = index + 1;
+            }
+            for (index, &k) in below.iter().enumerate() {
+                let first = starts[k as usize] as usize;
+                sums[index + 1] += factor[index] * inverse[first];
+                for entry in first + 1..starts[k as usize + 1] as usize {
+                    let other = place[rows[entry] as usize];
+                    if other > 0 {
+                        sums[other] += factor[index] * inverse[entry];
+                        sums[index + 1] += factor[other - 1] * inverse[entry];
+                    }
+                }
+            }
+            let pivot = self.factor[start].recip();
+            let mut diagonal = pivot * pivot;
+            for (index, &row) in below.iter().enumerate() {
+                let entry = -pivot * sums[index + 1];
+                inverse[start + 1 + index] = entry;
+                diagonal -= pivot * factor[index] * entry;
+                place[row as usize] = 0;
+            }
+            inverse[start] = diagonal;
+        }
+        Some(SelectedInverse { starts, rows, inverse })
+    }
+}
+
+/// Entries of an inverse where the factor has entries.
+pub(super) struct SelectedInverse<'a> {
+    starts: &'a [u32],
+    rows: &'a [u32],
+    inverse: Vec<f64>,
+}
+
+impl SelectedInverse<'_> {
+    /// An entry on or below the diagonal; `None` outside the pattern of the factor.
+    pub fn get(&self, row: usize, column: usize) -> Option<f64> {
+        let range = self.starts[column] as usize..self.starts[column + 1] as usize;
+        let offset = self.rows[range.clone()].binary_search(&(row as u32)).ok()?;
+        Some(self.inverse[range.start + offset])
     }
 }
 

@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod demo;
 mod eval;
+mod optimize;
 mod output;
 mod recordings;
 mod replay;
@@ -32,6 +33,8 @@ enum Command {
     Replay(replay::ReplayArguments),
     /// Write a recording and its truth from a robot driving through a world.
     Simulate(simulate::SimulateArguments),
+    /// Optimise a pose graph in g2o or TORO text.
+    Optimize(optimize::OptimizeArguments),
     /// Measure how well it works.
     Eval(eval::EvalArguments),
 }
@@ -43,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
+        Command::Optimize(arguments) => optimize::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
     };
     match outcome {

@@ -1,0 +1,421 @@
+//! Least squares that survives wrong constraints.
+//!
+//! Doubtful constraints get weights w in [0, 1] that multiply their information; solving and reweighting alternate.
+//!
+//! - *Graduated non-convexity* with truncated least squares: begin with a kernel so flat that the problem is nearly
+//!   ordinary least squares, sharpen it step by step, end with weights of 0 or 1.
+//! - *Dynamic covariance scaling*: w = s², s = min(1, 2c / (c + χ²)), sharp from the start.
+//!
+//! What is left is decided by χ²: the graph is solved with the accepted constraints alone, then every doubtful
+//! constraint is judged by how it fits the result, until nothing changes. Rejected constraints stay in the graph
+//! with their weight, so that a caller can show them.
+
+use nalgebra::Matrix3;
+
+use super::components::Components;
+use super::covariance::CovarianceSolver;
+use super::optimizer::Problem;
+use super::support::{Uncertain, find_backing};
+use super::{
+    Kernel, Method, OptimizeReport, PoseConstraint, PoseGraph, PoseGraphConfig, PoseGraphError, RobustConfig,
+    Start, Trust, optimize, spanning_tree_start,
+};
+use crate::geometry::Pose2;
+
+/// What robust optimisation did.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RobustReport {
+    /// The final solve over the accepted constraints; `iterations` counts all linear solves, `chi2_initial` is that
+    /// of all constraints at the poses as given.
+    pub report: OptimizeReport,
+    /// Weight of every constraint, 1: counts fully, 0: rejected.
+    pub inlier_weights: Vec<f64>,
+    /// Number of constraints with weight 0.
+    pub num_rejected: usize,
+}
+
+/// Weights never fall below this while solving, or poses that only wrong constraints reach would be undetermined.
+const WEIGHT_FLOOR: f64 = 1e-6;
+/// Rounds of judging every doubtful constraint by the result.
+const MAX_JUDGEMENTS: usize = 10;
+/// Damping for a system that has become singular to working precision.
+const RESCUE_DAMPING: f64 = 1e-6;
+/// A weight that changes by less counts as settled.
+const WEIGHT_TOLERANCE: f64 = 1e-3;
+
+/// Moves the poses to the least χ² over the constraints that hold together; on an error the graph is unchanged.
+///
+/// Starts at the given poses or at the chain of trusted constraints, whichever fits better. Trusted constraints are
+/// never rejected. When rejection cuts the graph, each part keeps its own frame and `num_components` says so.
+///
+/// # Errors
+/// As [`optimize`].
+pub fn optimize_robust(
+    graph: &mut PoseGraph,
+    config: &PoseGraphConfig,
+    robust: &RobustConfig,
+) -> Result<RobustReport, PoseGraphError> {
+    robust.validate("robust")?;
+    let num_constraints = graph.constraints().len();
+    if robust.kernel == Kernel::None {
+        let report = optimize(graph, config)?;
+        return Ok(RobustReport { report, inlier_weights: vec![1.0; num_constraints], num_rejected: 0 });
+    }
+    config.validate("pose_graph")?;
+    if graph.poses().is_empty() {
+        return Err(PoseGraphError::Empty);
+    }
+    let chi2_initial = graph.chi2();
+    let mut started = graph.clone();
+    choose_start(&mut started, config, robust);
+    let backing = find_backing(&started, robust);
+    let bound = robust.inlier_chi2_max * backing.covariance_scale;
+    let is_candidate = candidates(&started, backing.is_backed);
+    let candidate_graph = started.with_constraints(|index| is_candidate[index]);
+    let mut reweighting = Reweighting::new(&candidate_graph, robust, bound)?;
+    let num_solves = reweighting.run()?;
+    let mut weights = reweighting.problem.weights.iter();
+    let mut is_heavy = || weights.next().is_some_and(|&weight| weight >= 0.5);
+    let is_accepted: Vec<bool> = is_candidate.iter().map(|&candidate| candidate && is_heavy()).collect();
+    started.replace_poses(reweighting.problem.into_poses());
+    let (mut report, is_accepted) = judge(&mut started, is_accepted, config, bound)?;
+    report.iterations += num_solves;
+    report.chi2_initial = chi2_initial;
+    graph.replace_poses(started.poses().to_vec());
+    Ok(RobustReport {
+        report,
+        num_rejected: is_accepted.iter().filter(|&&accepted| !accepted).count(),
+        inlier_weights: is_accepted.iter().map(|&accepted| f64::from(u8::from(accepted))).collect(),
+    })
+}
+
+/// The constraints that take part in the reweighting: those that a neighbour backs, and those without which parts of
+/// the graph would not hang together; all of them when none is backed.
+fn candidates(graph: &PoseGraph, is_backed: Vec<bool>) -> Vec<bool> {
+    let any_backed =
+        graph.trusts().iter().zip(&is_backed).any(|(&trust, &backed)| backed && trust == Trust::Doubtful);
+    if !any_backed {
+        return vec![true; is_backed.len()];
+    }
+    let components = Components::of(graph, |index| is_backed[index]);
+    let component_of = |pose: u32| components.component_of_pose[pose as usize];
+    let joins = graph.constraints().iter().map(|c| component_of(c.i) != component_of(c.j));
+    is_backed.iter().zip(joins).map(|(&backed, joins)| backed || joins).collect()
+}
+
+/// Keeps the given poses unless the chain of trusted constraints has the smaller truncated cost.
+fn choose_start(graph: &mut PoseGraph, config: &PoseGraphConfig, robust: &RobustConfig) {
+    if config.start == Start::Given {
+        return;
+    }
+    let mut chained = graph.clone();
+    spanning_tree_start(&mut chained, &vec![false; graph.poses().len()]);
+    if truncated_cost(&chained, robust) < truncated_cost(graph, robust) {
+        *graph = chained;
+    }
+}
+
+/// Σ min(χ², c) over the doubtful and Σ χ² over the trusted constraints.
+fn truncated_cost(graph: &PoseGraph, robust: &RobustConfig) -> f64 {
+    let cost = |(index, &trust): (usize, &Trust)| {
+        let chi2 = graph.constraint_chi2(index as u32).unwrap_or_default();
+        if trust == Trust::Doubtful { chi2.min(robust.inlier_chi2_max) } else { chi2 }
+    };
+    graph.trusts().iter().enumerate().map(cost).sum()
+}
+
+/// Alternates linear solves and new weights.
+struct Reweighting<'a> {
+    problem: Problem<'a>,
+    doubtful: Vec<usize>,
+    robust: &'a RobustConfig,
+    /// Largest χ² of a right constraint.
+    bound: f64,
+    num_solves: u32,
+}
+
+impl<'a> Reweighting<'a> {
+    fn new(graph: &'a PoseGraph, robust: &'a RobustConfig, bound: f64) -> Result<Self, PoseGraphError> {
+        let components = Components::of(graph, |_| true);
+        let is_doubtful = |&index: &usize| graph.trusts()[index] == Trust::Doubtful;
+        let doubtful = (0..graph.constraints().len()).filter(is_doubtful).collect();
+        Ok(Self { problem: Problem::new(graph, &components)?, doubtful, robust, bound, num_solves: 0 })
+    }
+
+    /// Returns the number of linear solves.
+    fn run(&mut self) -> Result<u32, PoseGraphError> {
+        match self.robust.kernel {
+            Kernel::None => {}
+            Kernel::GraduatedNonConvexity => self.run_graduated()?,
+            Kernel::DynamicCovarianceScaling => self.run_scaled()?,
+        }
+        Ok(self.num_solves)
+    }
+
+    fn run_graduated(&mut self) -> Result<(), PoseGraphError> {
+        let bound = self.bound;
+        let largest = self.doubtful_chi2s().into_iter().fold(0.0, f64::max);
+        if largest <= bound {
+            return Ok(());
+        }
+        let mut sharpness = bound / (2.0 * largest - bound);
+        while self.num_solves < self.robust.max_reweightings {
+            self.solve()?;
+            let change = self.reweight(|chi2| truncated_weight(chi2, bound, sharpness));
+            let is_binary = |&index: &usize| {
+                let weight = self.problem.weights[index];
+                weight < WEIGHT_TOLERANCE || weight > 1.0 - WEIGHT_TOLERANCE
+            };
+            if sharpness > 1.0 && change < WEIGHT_TOLERANCE && self.doubtful.iter().all(is_binary) {
+                return Ok(());
+            }
+            sharpness *= self.robust.sharpening;
+        }
+        Ok(())
+    }
+
+    fn run_scaled(&mut self) -> Result<(), PoseGraphError> {
+        let bound = self.bound;
+        let scaled = |chi2: f64| (2.0 * bound / (bound + chi2)).min(1.0).powi(2);
+        self.reweight(scaled);
+        while self.num_solves < self.robust.max_reweightings {
+            self.solve()?;
+            if self.reweight(scaled) < WEIGHT_TOLERANCE {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn solve(&mut self) -> Result<(), PoseGraphError> {
+        self.num_solves += 1;
+        match self.problem.step(0.0) {
+            Err(PoseGraphError::NotPositiveDefinite { .. }) => self.problem.step(RESCUE_DAMPING),
+            result => result,
+        }
+    }
+
+    fn doubtful_chi2s(&self) -> Vec<f64> {
+        let all: Vec<f64> = self.problem.constraint_chi2s().collect();
+        self.doubtful.iter().map(|&index| all[index]).collect()
+    }
+
+    /// Gives every doubtful constraint a new weight; returns the largest change.
+    fn reweight(&mut self, weight_of: impl Fn(f64) -> f64) -> f64 {
+        let mut change = 0.0_f64;
+        for (&index, chi2) in self.doubtful.iter().zip(self.doubtful_chi2s()) {
+            let weight = weight_of(chi2).max(WEIGHT_FLOOR);
+            change = change.max((weight - self.problem.weights[index]).abs());
+            self.problem.weights[index] = weight;
+        }
+        change
+    }
+}
+
+/// Weight of truncated least squares at a stage of graduation; flat for small, a step at the bound for large
+/// `sharpness` (μ of Yang et al., Eq 14).
+fn truncated_weight(chi2: f64, bound: f64, sharpness: f64) -> f64 {
+    if chi2 <= bound * sharpness / (sharpness + 1.0) {
+        return 1.0;
+    }
+    if chi2 >= bound * (sharpness + 1.0) / sharpness {
+        return 0.0;
+    }
+    (bound / chi2 * sharpness * (sharpness + 1.0)).sqrt() - sharpness
+}
+
+/// Solves with the accepted constraints alone and judges all doubtful ones by the result, until that is stable.
+fn judge(
+    graph: &mut PoseGraph,
+    mut is_accepted: Vec<bool>,
+    config: &PoseGraphConfig,
+    bound: f64,
+) -> Result<(OptimizeReport, Vec<bool>), PoseGraphError> {
+    let config = PoseGraphConfig { start: Start::Given, ..config.clone() };
+    let mut num_solves = 0;
+    let mut round = 0;
+    loop {
+        round += 1;
+        let mut accepted = graph.with_constraints(|index| is_accepted[index]);
+        let mut report = solve_accepted(&mut accepted, &config)?;
+        num_solves += report.iterations;
+        report.iterations = num_solves;
+        graph.replace_poses(accepted.poses().to_vec());
+        let verdicts = verdicts(graph, &accepted, &is_accepted, bound)?;
+        if verdicts == is_accepted || round == MAX_JUDGEMENTS {
+            return Ok((report, is_accepted));
+        }
+        is_accepted = verdicts;
+    }
+}
+
+fn solve_accepted(graph: &mut PoseGraph, config: &PoseGraphConfig) -> Result<OptimizeReport, PoseGraphError> {
+    match optimize(graph, config) {
+        Err(PoseGraphError::NotPositiveDefinite { .. }) => {
+            optimize(graph, &PoseGraphConfig { method: Method::LevenbergMarquardt, ..config.clone() })
+        }
+        result => result,
+    }
+}
+
+/// Which constraints fit the present poses.
+///
+/// An accepted one has pulled the poses to itself and must fit well. A rejected one is measured against how sure the
+/// accepted ones are of the poses it joins; where they are so unsure that a random constraint would pass, it stays
+/// rejected, as does one that joins two components.
+fn verdicts(
+    graph: &PoseGraph,
+    accepted: &PoseGraph,
+    is_accepted: &[bool],
+    bound: f64,
+) -> Result<Vec<bool>, PoseGraphError> {
+    let mut gate = Gate { solver: CovarianceSolver::new(accepted)?, bound, space: pose_space(graph) };
+    let mut verdicts = Vec::with_capacity(is_accepted.len());
+    for (index, constraint) in graph.constraints().iter().enumerate() {
+        let is_right = if graph.trusts()[index] == Trust::Trusted {
+            true
+        } else if is_accepted[index] {
+            let chi2 = graph.constraint_chi2(index as u32);
+            chi2.is_some_and(|chi2| chi2 <= TOLERANCE_OF_ACCEPTED * bound)
+        } else {
+            gate.admits(constraint)
+        };
+        verdicts.push(is_right);
+    }
+    Ok(verdicts)
+}
+
+/// Measures rejected constraints against what the graph believes without them.
+struct Gate {
+    solver: CovarianceSolver,
+    bound: f64,
+    /// Size of the space of relative poses, m² rad.
+    space: f64,
+}
+
+impl Gate {
+    fn admits(&mut self, constraint: &PoseConstraint) -> bool {
+        let Some(measured) = Uncertain::of(constraint) else { return false };
+        let fits = |(pose, covariance): (Pose2, Matrix3<f64>), bound: f64| {
+            Uncertain { pose, covariance }.chi2_against(&measured).is_some_and(|chi2| chi2 <= bound)
+        };
+        // Most wrong constraints fail even the test that needs no solve.
+        let could_fit =
+            self.solver.relative_bound(constraint.i, constraint.j).is_ok_and(|r| fits(r, self.bound));
+        if !could_fit {
+            return false;
+        }
+        let Ok(believed) = self.solver.relative(constraint.i, constraint.j) else { return false };
+        let tolerated = (believed.1 + measured.covariance) * self.bound;
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * tolerated.determinant().max(0.0).sqrt();
+        volume <= CHANCE_MAX * self.space && fits(believed, self.bound)
+    }
+}
+
+/// Size of the space of relative poses in this map: its bounding box times all headings, m² rad.
+fn pose_space(graph: &PoseGraph) -> f64 {
+    let extent = |coordinate: fn(&Pose2) -> f64| {
+        let (low, high) = graph
+            .poses()
+            .iter()
+            .map(coordinate)
+            .fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+        high - low
+    };
+    extent(|pose| pose.x) * extent(|pose| pose.y) * std::f64::consts::TAU
+}
+
+/// χ² up to this multiple of the bound is forgiven to a constraint that was accepted.
+const TOLERANCE_OF_ACCEPTED: f64 = 4.0;
+/// A rejected constraint is not taken back where one at random would pass with this probability.
+const CHANCE_MAX: f64 = 0.01;
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{constraint, random_drive, random_pose};
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    const KERNELS: [Kernel; 2] = [Kernel::GraduatedNonConvexity, Kernel::DynamicCovarianceScaling];
+
+    fn with(kernel: Kernel) -> RobustConfig {
+        RobustConfig { kernel, ..RobustConfig::default() }
+    }
+
+    #[test]
+    fn random_closures_are_rejected_and_true_ones_kept() {
+        for seed in 0..10 {
+            let (mut graph, truth) = random_drive(seed, 120, 60);
+            let num_true = graph.constraints().len();
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            for _ in 0..30 {
+                let i = rng.random_range(0..120);
+                let j = (i + rng.random_range(10..110)) % 120;
+                let z = random_pose(&mut rng, 20.0, 3.0);
+                graph.add_doubtful(constraint(i, j, z, [900.0, 1200.0, 2500.0])).unwrap();
+            }
+            for kernel in KERNELS {
+                let mut graph = graph.clone();
+                let report = optimize_robust(&mut graph, &PoseGraphConfig::default(), &with(kernel)).unwrap();
+                let num_kept =
+                    report.inlier_weights[num_true..].iter().filter(|&&weight| weight > 0.0).count();
+                assert_eq!(num_kept, 0, "seed {seed} {kernel:?}");
+                assert!(report.inlier_weights[..num_true].iter().all(|&weight| weight == 1.0));
+                for (pose, truth) in graph.poses().iter().zip(&truth) {
+                    assert!(pose.distance(truth) < 0.5);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn without_false_closures_the_result_is_the_ordinary_one() {
+        let (graph, _) = random_drive(4, 100, 60);
+        let (mut ordinary, mut robust) = (graph.clone(), graph);
+        let expected = optimize(&mut ordinary, &PoseGraphConfig::default()).unwrap();
+        for kernel in [Kernel::None, Kernel::GraduatedNonConvexity] {
+            let report = optimize_robust(&mut robust, &PoseGraphConfig::default(), &with(kernel)).unwrap();
+            assert_eq!(report.num_rejected, 0);
+            assert!((report.report.chi2 - expected.chi2).abs() < 1e-6 * expected.chi2);
+        }
+    }
+
+    #[test]
+    fn rejecting_the_only_tie_leaves_two_components() {
+        let (mut graph, _) = random_drive(2, 20, 10);
+        for _ in 0..3 {
+            graph.add_pose(Pose2::identity()).unwrap();
+        }
+        let step = Pose2::new(1.0, 0.0, 0.0);
+        for i in 20..22 {
+            graph.add_constraint(constraint(i, i + 1, step, [100.0; 3])).unwrap();
+        }
+        graph.add_doubtful(constraint(3, 20, Pose2::new(5.0, 0.0, 0.0), [1e4; 3])).unwrap();
+        graph.add_doubtful(constraint(3, 22, Pose2::new(-5.0, 0.0, 0.0), [1e4; 3])).unwrap();
+        let report =
+            optimize_robust(&mut graph, &PoseGraphConfig::default(), &with(Kernel::GraduatedNonConvexity))
+                .unwrap();
+        assert!(report.num_rejected >= 1, "{report:?}");
+        assert!(graph.poses().iter().all(Pose2::is_finite));
+    }
+
+    #[test]
+    fn weights_of_truncated_least_squares_fall_from_one_to_zero() {
+        for sharpness in [1e-3, 1.0, 1e3] {
+            let weights: Vec<f64> =
+                (0..2000).map(|k| truncated_weight(f64::from(k) * 0.1, 16.0, sharpness)).collect();
+            assert!(weights.windows(2).all(|pair| pair[1] <= pair[0] + 1e-12));
+            assert!(weights.iter().all(|weight| (0.0..=1.0).contains(weight)));
+            assert_eq!(weights[0], 1.0);
+        }
+    }
+
+    #[test]
+    fn impossible_settings_name_the_field() {
+        let (mut graph, _) = random_drive(1, 5, 2);
+        let robust = RobustConfig { sharpening: 1.0, ..RobustConfig::default() };
+        let error = optimize_robust(&mut graph, &PoseGraphConfig::default(), &robust).unwrap_err();
+        assert!(matches!(error, PoseGraphError::Config(ref config) if config.field == "robust.sharpening"));
+    }
+}
