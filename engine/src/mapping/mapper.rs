@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::anchors::AnchorSet;
-use super::candidates::profile_candidates;
+use super::candidates::candidates_across;
 use super::claims::{ClosureIndex, spatial_match};
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
@@ -34,7 +34,7 @@ pub fn map_site(
         return Ok(SiteMap::default());
     }
     let mut mapper = Mapper::new(config, runs, &set)?;
-    mapper.settle(memo)?;
+    mapper.settle(config.max_rounds, memo)?;
     if runs.len() > 1 {
         mapper.join(memo)?;
     }
@@ -65,8 +65,8 @@ impl<'a> Mapper<'a> {
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
-    fn settle(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        for _round in 0..self.config.max_rounds {
+    fn settle(&mut self, max_rounds: usize, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
+        for _round in 0..max_rounds {
             let round = guided_closures(self.set, &self.graph, &self.components, self.config, memo)?;
             let kept = self.graph.optimise(self.set, &round.closures, self.config)?;
             let found: Vec<Closure> = round
@@ -91,28 +91,22 @@ impl<'a> Mapper<'a> {
 
     /// Lays components over each other, the surest first, as long as one convinces.
     fn join(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        let candidates = profile_candidates(self.runs, self.set, self.config);
-        let across: Vec<_> = candidates
-            .into_iter()
-            .filter(|candidate| {
-                self.set.anchors[candidate.earlier].run_idx != self.set.anchors[candidate.later].run_idx
-            })
-            .collect();
+        let across = candidates_across(self.runs, self.set, self.config);
         let registered: Vec<Closure> =
             registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
         if std::env::var("V").is_ok() {
             eprintln!("join: candidates {} registered {}", across.len(), registered.len());
         }
-        let mut refused: BTreeSet<(u32, u32)> = BTreeSet::new();
+        let mut refused: BTreeSet<(u32, u32, usize)> = BTreeSet::new();
         loop {
             let proposals = hypotheses(&registered, self.set, &self.graph, &self.components, self.config);
-            let proposal =
-                proposals.into_iter().find(|proposal| !refused.contains(&(proposal.host, proposal.guest)));
+            let proposal = proposals.into_iter().find(|proposal| !refused.contains(&proposal.name()));
             let Some(proposal) = proposal else { return Ok(()) };
             if self.try_join(&proposal, memo)? {
+                self.settle(self.config.max_rounds, memo)?;
                 refused.clear();
             } else {
-                refused.insert((proposal.host, proposal.guest));
+                refused.insert(proposal.name());
             }
         }
     }
@@ -141,7 +135,7 @@ impl<'a> Mapper<'a> {
         let kept = self.graph.optimise(self.set, &seeds, self.config)?;
         let num_seeds = kept[self.closures.len()..].iter().filter(|kept| **kept).count();
         if num_seeds > 0 {
-            self.settle(memo)?;
+            self.settle(2, memo)?;
         }
         let is_across = |a: usize, b: usize| (is_guest(a) && is_host(b)) || (is_guest(b) && is_host(a));
         let guest_of = |a: usize, b: usize| if is_guest(a) { a } else { b };
