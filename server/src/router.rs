@@ -21,7 +21,7 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::auth;
 use crate::error::ApiError;
 use crate::handlers::{
-    batches, jobs, labels, localisations, maps, matches, operations, queries, runs, sites, texts,
+    batches, jobs, labels, localisations, maps, matches, operations, places, queries, runs, sites, texts,
 };
 use crate::openapi::{self, Document};
 use crate::state::AppState;
@@ -66,6 +66,8 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(queries::query_words))
         .routes(routes!(labels::list_labels))
         .routes(routes!(labels::query_labels))
+        .routes(routes!(places::list_places))
+        .routes(routes!(places::get_route))
         .routes(routes!(localisations::query_example_everywhere))
 }
 

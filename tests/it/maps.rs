@@ -194,6 +194,16 @@ async fn labels_are_listed_and_asked_for() {
     let question = json!({"labels": [{"label": labels[0]["label"]}]});
     let answers = api.post("/v1/sites/a/queries/labels", &question).await.ok();
     assert!(!answers.as_array().unwrap().is_empty());
+    let places = api.get("/v1/sites/a/places").await.ok();
+    assert!(!places.as_array().unwrap().is_empty());
+    let map = api.get("/v1/sites/a/map").await.ok();
+    let poses = map["runs"][0]["poses"].as_array().unwrap();
+    let (from, to) = (&poses[0], &poses[poses.len() / 3]);
+    let ends = format!("from_x={}&from_y={}&to_x={}&to_y={}", from["x"], from["y"], to["x"], to["y"]);
+    let route = api.get(&format!("/v1/sites/a/route?{ends}")).await.ok();
+    assert!(route["length_m"].as_f64().unwrap() > 5.0, "{route}");
+    assert!(!route["description"].as_str().unwrap().is_empty());
+    api.get("/v1/sites/a/route?from_x=999&from_y=0&to_x=0&to_y=0").await.problem(404, "not-found");
     let unknown = json!({"labels": [{"label": "cellar"}]});
     let problem = api.post("/v1/sites/a/queries/labels", &unknown).await.problem(422, "invalid-value");
     assert_eq!(problem["field"], "labels[0].label");

@@ -9,10 +9,11 @@ use locution_engine::mapping::{
     Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
     SiteMap, map_site,
 };
+use locution_engine::semantics::SemanticsConfig;
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
-use super::labels::{StoredLabel, label_map};
+use super::labels::{LabelledMap, label_map};
 use super::maps::WrittenRun;
 use super::matches::holds_for;
 use super::reading::{read_keyframes, read_observations, read_words};
@@ -145,18 +146,19 @@ async fn map_runs(
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
-) -> Result<(SiteMap, Vec<Vec<StoredLabel>>), AppError> {
+) -> Result<(SiteMap, LabelledMap), AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
-        return Ok((map, vec![Vec::new(); runs.len()]));
+        let labels = LabelledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+        return Ok((map, labels));
     }
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
     let (memo, outcome) = on_blocking_thread(move || {
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
         let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
             keep_vetoed_visible(&mut map, &decisions);
-            let labels = label_map(&records, &map);
+            let labels = label_map(&records, &map, &SemanticsConfig::default());
             (map, labels)
         });
         (memo, outcome)

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{RunRecord, SiteMap};
-use locution_engine::semantics::{DrivenRun, LabelledRun, PlaceLabel, SemanticsConfig, label_runs};
+use locution_engine::semantics::{DrivenRun, LabelledRun, PlaceLabel, PlaceMap, SemanticsConfig, label_runs};
 use serde::{Deserialize, Serialize};
 
 use super::AppError;
@@ -24,29 +24,41 @@ pub struct StoredLabel {
     confidence: f32,
 }
 
-/// Labels of all observations of all runs, component by component.
-pub(super) fn label_map(runs: &[RunRecord<'_>], map: &SiteMap) -> Vec<Vec<StoredLabel>> {
+/// What the map builder stores of labels.
+#[derive(Clone, Debug, Default)]
+pub(super) struct LabelledMap {
+    /// A label for every observation of every run, as its place has it.
+    pub labels: Vec<Vec<StoredLabel>>,
+    /// The places of each component.
+    pub places: Vec<(u32, PlaceMap)>,
+}
+
+/// Labels of all observations of all runs, and the places that they make, component by component.
+pub(super) fn label_map(runs: &[RunRecord<'_>], map: &SiteMap, config: &SemanticsConfig) -> LabelledMap {
     let mut by_component: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (run_idx, mapped) in map.runs.iter().enumerate().filter(|(_, run)| !run.map_from_keyframes.is_empty())
     {
         by_component.entry(mapped.component).or_default().push(run_idx);
     }
-    let config = SemanticsConfig::default();
-    let mut labels = vec![Vec::new(); runs.len()];
-    for members in by_component.values() {
+    let mut labelled_map = LabelledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+    for (component, members) in &by_component {
         let driven: Vec<DrivenRun<'_>> = members
             .iter()
             .map(|&run_idx| DrivenRun::in_map(&runs[run_idx], &map.runs[run_idx].map_from_keyframes))
             .collect();
-        for (&run_idx, labelled) in members.iter().zip(label_runs(&config, &driven)) {
-            labels[run_idx] = stored(&labelled);
+        let labelled = label_runs(config, &driven);
+        let places = PlaceMap::build(config, &driven, &labelled);
+        for (member_idx, (&run_idx, labelled)) in members.iter().zip(&labelled).enumerate() {
+            labelled_map.labels[run_idx] = stored(&places.labels_of_run(member_idx), labelled);
         }
+        labelled_map.places.push((*component, places));
     }
-    labels
+    labelled_map
 }
 
-fn stored(labelled: &LabelledRun) -> Vec<StoredLabel> {
-    let pairs = labelled.labels.iter().zip(&labelled.confidences);
+/// The labels of places, with what the single pass saw for or against its own.
+fn stored(labels: &[PlaceLabel], labelled: &LabelledRun) -> Vec<StoredLabel> {
+    let pairs = labels.iter().zip(&labelled.confidences);
     pairs
         .map(|(label, confidence)| StoredLabel { label_idx: label.index() as u8, confidence: *confidence })
         .collect()

@@ -7,8 +7,9 @@ use locution_engine::mapping::{PlaceMatch, SiteMap};
 use locution_engine::scan::Scan;
 use serde::{Deserialize, Serialize};
 
-use super::labels::StoredLabel;
+use super::labels::{LabelledMap, StoredLabel};
 use super::matches::StoredMatches;
+use super::places::append_places;
 use super::records::StoredRun;
 use super::runs::read_run;
 use super::scans::read_scans;
@@ -190,7 +191,7 @@ impl Site {
     pub(super) async fn write_map(
         &self,
         map: &SiteMap,
-        labels: &[Vec<StoredLabel>],
+        labelled: &LabelledMap,
         runs: &[WrittenRun],
         duration_s: f64,
     ) -> Result<MapRecord, AppError> {
@@ -207,7 +208,7 @@ impl Site {
         };
         let mut batch = Batch::default();
         let (mut first_pose, mut first_label) = (0, 0);
-        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(labels) {
+        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(&labelled.labels) {
             let poses: Vec<MapPose> = written
                 .keyframe_seqs
                 .iter()
@@ -232,6 +233,10 @@ impl Site {
             });
             first_pose += poses.len() as u64;
             first_label += labels.len() as u64;
+            self.commit_when_large(&mut batch).await?;
+        }
+        for (component, places) in &labelled.places {
+            append_places(&mut batch, version, *component, places)?;
             self.commit_when_large(&mut batch).await?;
         }
         for chunk in StoredMatches::chunks(&map.matches)? {

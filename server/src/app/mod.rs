@@ -31,6 +31,7 @@ pub mod matches;
 mod names;
 mod occupancy;
 mod open_runs;
+mod places;
 pub mod reading;
 pub mod records;
 mod regenerate;

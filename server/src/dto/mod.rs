@@ -6,6 +6,7 @@ pub mod jobs;
 pub mod labels;
 pub mod localisations;
 pub mod maps;
+pub mod places;
 pub mod queries;
 pub mod runs;
 pub mod sites;

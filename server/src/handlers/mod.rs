@@ -8,6 +8,7 @@ pub mod localisations;
 pub mod maps;
 pub mod matches;
 pub mod operations;
+pub mod places;
 pub mod queries;
 pub mod runs;
 pub mod sites;
