@@ -19,7 +19,7 @@ use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, s
 use super::eval::recognition::{judged_match, judged_run};
 use super::output::table;
 use super::recordings::Recording;
-use super::upload::{UploadOptions, progress_bar, upload_recording};
+use super::upload::{UploadOptions, build_with_progress, progress_bar, upload_recording};
 use super::worlds::decode_picture;
 use crate::config::ServerConfig;
 use crate::{RunningServer, StartError, start_server};
@@ -134,10 +134,9 @@ async fn demo(arguments: &DemoArguments) -> Result<()> {
     let recordings: Vec<Recording> =
         ROBOTS.iter().zip(&simulated).map(|(robot, run)| recording(robot.name, run)).collect();
     send(&client, &recordings).await?;
-    println!("\nBuilding the map …");
     let built = Instant::now();
-    client.build_map(SITE).await.context("the map cannot be built")?;
-    println!("built in {:.1} s\n", built.elapsed().as_secs_f64());
+    build_with_progress(&client, SITE).await?;
+    println!("The map was built in {:.1} s.\n", built.elapsed().as_secs_f64());
 
     report(&client, &recordings, &simulated).await?;
     write_map(&client, directory).await?;

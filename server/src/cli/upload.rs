@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use locution_client::{Client, Encoding, NewRun, Scan};
 use locution_engine::formats::CarmenLog;
@@ -52,6 +52,33 @@ pub fn progress_bar(bars: &MultiProgress, run: &str, num_scans: usize) -> Progre
     bar.set_style(style);
     bar.set_prefix(run.to_owned());
     bar
+}
+
+/// Builds the map of a site and shows how far it is.
+///
+/// The job is asked about rather than waited for in one request, which would end at the server's time limit.
+///
+/// # Errors
+/// The build failed, or the server refused it.
+pub async fn build_with_progress(client: &Client, site: &str) -> Result<()> {
+    let style = ProgressStyle::with_template("{prefix:<16} {bar:32.cyan/white} {percent:>6} %  {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar())
+        .progress_chars("━╸─");
+    let bar = ProgressBar::new(1000).with_style(style).with_prefix("building the map");
+    let mut job = client.start_build(site).await.context("the map cannot be built")?;
+    loop {
+        match job.state.as_str() {
+            "done" => break,
+            "failed" => bail!("the map could not be built: {}", job.error.or(job.detail).unwrap_or_default()),
+            _ => {}
+        }
+        bar.set_position((1000.0 * job.progress) as u64);
+        bar.set_message(job.detail.clone().unwrap_or_default());
+        tokio::time::sleep(Duration::from_millis(200)).await;
+        job = client.job(site, &job).await?;
+    }
+    bar.finish_with_message(job.detail.unwrap_or_default());
+    Ok(())
 }
 
 /// Posts what the server does not have yet of a recording.

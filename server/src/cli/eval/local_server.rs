@@ -11,7 +11,7 @@ use locution_engine::formats::CarmenOptions;
 
 use crate::cli::recordings::{Recording, read_recording};
 use crate::cli::replay::Format;
-use crate::cli::upload::{UploadOptions, Uploaded, progress_bar, upload_recording};
+use crate::cli::upload::{UploadOptions, Uploaded, build_with_progress, progress_bar, upload_recording};
 use crate::config::ServerConfig;
 use crate::{RunningServer, start_server};
 
@@ -139,6 +139,6 @@ impl RecordingArguments {
 /// The build failed.
 pub async fn build_map(server: &LocalServer) -> Result<f64> {
     let began = Instant::now();
-    server.client.build_map(SITE).await.context("the map cannot be built")?;
+    build_with_progress(&server.client, SITE).await?;
     Ok(began.elapsed().as_secs_f64())
 }
