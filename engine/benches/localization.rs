@@ -3,6 +3,8 @@
 //! The map is an office of rooms on corridors with two thirds of its cells free. `spread` particles stand all over it,
 //! as after power-on; `gathered` ones within a metre, as when tracking. One core: run with `RAYON_NUM_THREADS=1`.
 
+use std::f64::consts::PI;
+
 use criterion::{Criterion, criterion_group, criterion_main};
 use locution_engine::geometry::{Point2, Pose2};
 use locution_engine::localization::{
@@ -91,7 +93,7 @@ fn track(criterion: &mut Criterion) {
         let points: Vec<Point2> = (0..num_beams)
             .map(|beam| {
                 let (angle, range) =
-                    (f64::from(beam) * 3.14 / f64::from(num_beams) - 1.57, 1.0 + f64::from(beam % 7));
+                    (PI * (f64::from(beam) / f64::from(num_beams) - 0.5), 1.0 + f64::from(beam % 7));
                 Point2::new(range * angle.cos(), range * angle.sin())
             })
             .collect();

@@ -73,11 +73,11 @@ pub(super) fn span<const W: usize>(first: i64, last: i64) -> Row<W> {
 pub(super) fn spread<const W: usize>(seed: &Row<W>, mask: &Row<W>) -> Row<W> {
     let mut reach = [0; W];
     let mut carry = false;
-    for word in 0..W {
-        let (sum, first_carry) = mask[word].overflowing_add(seed[word]);
+    for ((reach, &seed), &mask) in reach.iter_mut().zip(seed).zip(mask) {
+        let (sum, first_carry) = mask.overflowing_add(seed);
         let (sum, second_carry) = sum.overflowing_add(u64::from(carry));
         carry = first_carry | second_carry;
-        reach[word] = (mask[word] & !sum) | seed[word];
+        *reach = (mask & !sum) | seed;
     }
     let mut from_right = 0;
     for word in (0..W).rev() {

@@ -129,10 +129,8 @@ impl<'a> DensityModel<'a> {
                 continue;
             };
             let heading = (heading * 128.0 + 128.5) as i32 as u8;
-            let mut num_failed = 0;
-            for kernel in 0..STRIDE {
-                num_failed += tests[kernel].num_failed(codes[kernel], heading);
-            }
+            let num_failed: usize =
+                tests.iter().zip(codes).map(|(test, &code)| test.num_failed(code, heading)).sum();
             *weight *= self.weights[num_failed];
         }
     }

@@ -202,10 +202,10 @@ impl<'a> LikelihoodFieldModel<'a> {
         let mut score = 0;
         for (along, across) in &self.ends {
             let mut cells = [0; BLOCK];
-            for slot in 0..BLOCK {
-                let column = clamp(x + cos * along[slot] - sin * across[slot], right);
-                let row = clamp(y + sin * along[slot] + cos * across[slot], top);
-                cells[slot] = (floor_bits(row) << field.row_shift) | floor_bits(column);
+            for ((cell, along), across) in cells.iter_mut().zip(along).zip(across) {
+                let column = clamp(x + cos * along - sin * across, right);
+                let row = clamp(y + sin * along + cos * across, top);
+                *cell = (floor_bits(row) << field.row_shift) | floor_bits(column);
             }
             for cell in cells {
                 score += u32::from(field.codes.get(cell as usize).copied().unwrap_or(0));

@@ -118,13 +118,14 @@ impl Step {
     #[inline]
     fn apply(&self, x: &mut Lanes, y: &mut Lanes, heading: &mut Lanes, noise: &mut NoiseLanes) {
         let (first, drive, second) = (noise.normals(), noise.normals(), noise.normals());
-        for lane in 0..LANES {
-            let towards = wrap_turns(heading[lane] + self.first_turn + self.first_turn_sd * first[lane]);
-            let drive_m = self.drive_m + self.drive_sd_m * drive[lane];
+        let noises = first.iter().zip(&drive).zip(&second);
+        for (((x, y), heading), ((first, drive), second)) in x.iter_mut().zip(y).zip(heading).zip(noises) {
+            let towards = wrap_turns(*heading + self.first_turn + self.first_turn_sd * first);
+            let drive_m = self.drive_m + self.drive_sd_m * drive;
             let (sin, cos) = sin_cos_turns(towards);
-            x[lane] += drive_m * cos;
-            y[lane] += drive_m * sin;
-            heading[lane] = wrap_turns(towards + self.second_turn + self.second_turn_sd * second[lane]);
+            *x += drive_m * cos;
+            *y += drive_m * sin;
+            *heading = wrap_turns(towards + self.second_turn + self.second_turn_sd * second);
         }
     }
 }
