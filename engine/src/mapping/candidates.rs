@@ -23,34 +23,24 @@ pub(crate) struct Candidate {
     pub profile: ProfileCandidate,
 }
 
-/// Profile candidates between different runs, at most one for a pair of anchors and a direction, in order of anchors.
-///
-/// Every two runs are compared on their own: among the runs of many buildings those of other buildings would take the
-/// few places that each window has to give.
-pub(crate) fn candidates_across(
+/// Profile candidates of all runs, at most one for a pair of anchors and a direction, in order of anchors.
+pub(crate) fn profile_candidates(
     runs: &[RunRecord<'_>],
     set: &AnchorSet,
     config: &MappingConfig,
 ) -> Vec<Candidate> {
     let spacing_m = config.retrieval.sample_spacing_m;
-    let profiles: Vec<RunProfile> =
+    let profiles =
         runs.iter().map(|run| RunProfile::from_observations(run.observations, spacing_m)).collect();
+    let index = ProfileIndex::build(profiles, config.retrieval.clone());
     let mut best: BTreeMap<(usize, usize, Direction), Candidate> = BTreeMap::new();
-    for later_run in 0..runs.len() {
-        for earlier_run in 0..later_run {
-            let pair = vec![profiles[earlier_run].clone(), profiles[later_run].clone()];
-            let index = ProfileIndex::build(pair, config.retrieval.clone());
-            for mut profile in index.all_candidates(1).into_iter().filter(|found| found.earlier.run_idx == 0)
-            {
-                profile.earlier.run_idx = earlier_run as u32;
-                profile.later.run_idx = later_run as u32;
-                let Some(candidate) = to_anchors(runs, set, profile) else { continue };
-                let key = (candidate.later, candidate.earlier, candidate.profile.direction);
-                let is_better =
-                    best.get(&key).is_none_or(|other| candidate.profile.score > other.profile.score);
-                if is_better {
-                    best.insert(key, candidate);
-                }
+    for run_idx in 0..runs.len() {
+        for profile in index.all_candidates(run_idx) {
+            let Some(candidate) = to_anchors(runs, set, profile) else { continue };
+            let key = (candidate.later, candidate.earlier, candidate.profile.direction);
+            let is_better = best.get(&key).is_none_or(|other| candidate.profile.score > other.profile.score);
+            if is_better {
+                best.insert(key, candidate);
             }
         }
     }

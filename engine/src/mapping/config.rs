@@ -59,8 +59,8 @@ pub struct MappingConfig {
     pub min_joining_share: f64,
     /// Largest standard deviation of the place of one run in the other, metres.
     pub max_joining_sd_m: f64,
-    /// Anchors that must agree before a joined map is tried.
-    pub min_seeds: usize,
+    /// The runner-up must have less than this share of the best hypothesis' support.
+    pub max_ambiguity: f64,
 }
 
 impl Default for MappingConfig {
@@ -73,7 +73,7 @@ impl Default for MappingConfig {
             submap_half_length_m: 4.0,
             max_submap_scans: 50,
             drift_per_m: 0.012,
-            drift_turn_rad: 0.005,
+            drift_turn_rad: 0.004,
             drift_turn_per_rad: 0.01,
             fit_floor_m: 0.02,
             fit_floor_rad: 0.003,
@@ -85,12 +85,12 @@ impl Default for MappingConfig {
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
             max_rounds: 8,
-            max_chi2: 25.0,
+            max_chi2: 16.0,
             min_support: 2,
             min_joining_anchors: 5,
-            min_joining_share: 0.5,
-            max_joining_sd_m: 0.5,
-            min_seeds: 2,
+            min_joining_share: 0.7,
+            max_joining_sd_m: 0.2,
+            max_ambiguity: 0.7,
         }
     }
 }

@@ -32,13 +32,6 @@ pub(crate) struct Hypothesis {
     pub num_anchors: usize,
 }
 
-impl Hypothesis {
-    /// Tells hypotheses apart: the components and the first closure's later anchor.
-    pub fn name(&self) -> (u32, u32, usize) {
-        (self.host, self.guest, self.closures.first().map_or(0, |closure| closure.later))
-    }
-}
-
 /// Registers the candidates between different components.
 pub(crate) fn registered_candidates(
     candidates: &[Candidate],
@@ -65,7 +58,8 @@ pub(crate) fn registered_candidates(
         .collect()
 }
 
-/// The best few hypotheses between every two components, most anchors first.
+/// The best hypotheses between every two components, most anchors first. A hypothesis that has a rival of nearly as
+/// many anchors is left out.
 pub(crate) fn hypotheses(
     closures: &[Closure],
     set: &AnchorSet,
@@ -93,16 +87,10 @@ pub(crate) fn hypotheses(
             .collect();
         let oriented: Vec<Vote> =
             between.iter().map(|closure| vote(closure, graph, component, host)).collect();
-        // The extension judges; here it only matters that the true one is among the first few.
-        let mut taken: Vec<Closure> = Vec::new();
-        for _ in 0..MAX_HYPOTHESES {
-            let Some(best) = best_hypothesis(&oriented, &between, graph, (host, guest), &taken) else {
-                break;
-            };
-            if best.num_anchors < config.min_seeds {
-                break;
-            }
-            taken.extend(best.closures.iter().copied());
+        let Some(best) = best_hypothesis(&oriented, &between, graph, (host, guest), &[]) else { continue };
+        let rival = best_hypothesis(&oriented, &between, graph, (host, guest), &best.closures);
+        let rival_anchors = rival.map_or(0, |rival| rival.num_anchors);
+        if rival_anchors as f64 <= config.max_ambiguity * best.num_anchors as f64 && best.num_anchors >= 3 {
             found.push(best);
         }
     }
@@ -111,9 +99,6 @@ pub(crate) fn hypotheses(
     });
     found
 }
-
-/// Hypotheses tried for two components.
-const MAX_HYPOTHESES: usize = 3;
 
 /// What one closure says of the two frames.
 #[derive(Clone, Copy, Debug)]

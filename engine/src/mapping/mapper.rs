@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::anchors::AnchorSet;
-use super::candidates::candidates_across;
+use super::candidates::profile_candidates;
 use super::claims::{ClosureIndex, spatial_match};
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
@@ -36,7 +36,7 @@ pub fn map_site(
     }
     let judgements = Judgements::new(decisions, runs, &set, config.submap_half_length_m);
     let mut mapper = Mapper::new(config, runs, &set, &judgements)?;
-    mapper.settle(config.max_rounds, memo)?;
+    mapper.settle(memo)?;
     if runs.len() > 1 {
         mapper.join(memo)?;
     }
@@ -69,8 +69,8 @@ impl<'a> Mapper<'a> {
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
-    fn settle(&mut self, max_rounds: usize, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        for _ in 0..max_rounds {
+    fn settle(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
+        for _ in 0..self.config.max_rounds {
             let may_match = |earlier: usize, later: usize| {
                 self.components[self.set.anchors[earlier].run_idx as usize]
                     == self.components[self.set.anchors[later].run_idx as usize]
@@ -98,20 +98,26 @@ impl<'a> Mapper<'a> {
 
     /// Lays components over each other, the surest first, as long as one convinces.
     fn join(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        let mut across = candidates_across(self.runs, self.set, self.config);
-        across.retain(|candidate| !self.judgements.forbid(candidate.earlier, candidate.later));
+        let candidates = profile_candidates(self.runs, self.set, self.config);
+        let across: Vec<_> = candidates
+            .into_iter()
+            .filter(|candidate| {
+                self.set.anchors[candidate.earlier].run_idx != self.set.anchors[candidate.later].run_idx
+                    && !self.judgements.forbid(candidate.earlier, candidate.later)
+            })
+            .collect();
         let registered: Vec<Closure> =
             registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
-        let mut refused: BTreeSet<(u32, u32, usize)> = BTreeSet::new();
+        let mut refused: BTreeSet<(u32, u32)> = BTreeSet::new();
         loop {
             let proposals = hypotheses(&registered, self.set, &self.graph, &self.components, self.config);
-            let proposal = proposals.into_iter().find(|proposal| !refused.contains(&proposal.name()));
+            let proposal =
+                proposals.into_iter().find(|proposal| !refused.contains(&(proposal.host, proposal.guest)));
             let Some(proposal) = proposal else { return Ok(()) };
             if self.try_join(&proposal, memo)? {
-                self.settle(self.config.max_rounds, memo)?;
                 refused.clear();
             } else {
-                refused.insert(proposal.name());
+                refused.insert((proposal.host, proposal.guest));
             }
         }
     }
@@ -140,7 +146,7 @@ impl<'a> Mapper<'a> {
         let kept = self.graph.optimise(self.set, &seeds, self.config)?;
         let num_seeds = kept[self.closures.len()..].iter().filter(|kept| **kept).count();
         if num_seeds > 0 {
-            self.settle(2, memo)?;
+            self.settle(memo)?;
         }
         let is_across = |a: usize, b: usize| (is_guest(a) && is_host(b)) || (is_guest(b) && is_host(a));
         let guest_of = |a: usize, b: usize| if is_guest(a) { a } else { b };

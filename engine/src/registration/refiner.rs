@@ -124,15 +124,10 @@ impl OdometryRefiner {
         if !is_keyframe {
             return Refined { run_from_robot, keyframe: None };
         }
-        let doubt =
-            alignment.as_ref().map_or(0.0, |fit| (config.sure_inlier_share - fit.inlier_share).max(0.0));
-        let mut covariance = match alignment.and_then(|alignment| alignment.information.try_inverse()) {
+        let covariance = match alignment.and_then(|alignment| alignment.information.try_inverse()) {
             Some(in_run) => rotated(&in_run, -self.state.run_from_keyframe.theta),
             None => config.odometry.covariance(&since_keyframe),
         };
-        // A fit that leaves many returns unexplained may be a wrong one: a tenth unexplained is worth a centimetre and
-        // half a degree, four tenths sixteen times that.
-        covariance += Matrix3::identity() * doubt.powi(4);
         self.state.travel_mm += (distance_m * 1000.0).round() as u64;
         self.keep(&points, run_from_robot, scan.odom_from_robot);
         Refined {
