@@ -80,7 +80,7 @@ impl Default for MappingConfig {
             min_agreement: 0.8,
             min_overlap: 0.25,
             min_gap_m: 10.0,
-            beside_m: 1.05,
+            beside_m: 1.1,
             neighbour_distance_m: 5.0,
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,

@@ -176,7 +176,7 @@ impl<'a> Mapper<'a> {
         let settings = StretchSettings {
             distance_m: self.config.beside_m,
             min_gap_m: self.config.min_gap_m,
-            max_observations: 15,
+            max_observations: 25,
         };
         let index: ClosureIndex<'_> =
             self.closures.iter().map(|closure| ((closure.earlier, closure.later), closure)).collect();

@@ -174,5 +174,5 @@ fn continues(growing: &Growing, link: &Link) -> bool {
         Direction::Same => advance,
         Direction::Opposite => -advance,
     };
-    last.run_idx == link.run_idx && last.direction == link.direction && (0..=3).contains(&forward)
+    last.run_idx == link.run_idx && last.direction == link.direction && (0..=4).contains(&forward)
 }

@@ -117,11 +117,7 @@ impl OdometryNoise {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefinerConfig {
-    /// A scan is registered after this much travel since the last registered one, metres.
-    pub motion_distance_m: f64,
-    /// … or after this much turning, radians.
-    pub motion_turn_rad: f64,
-    /// A registered scan is a keyframe after this much travel since the last keyframe, metres.
+    /// A scan is registered after this much travel, metres.
     pub keyframe_distance_m: f64,
     /// … or after this much turning, radians.
     pub keyframe_turn_rad: f64,
@@ -149,10 +145,6 @@ pub struct RefinerConfig {
     pub max_iterations: usize,
     /// This many returns count as one independent measurement.
     pub correlated_returns: f64,
-    /// A fit with this share of returns on surfaces is not tried from other headings.
-    pub sure_inlier_share: f64,
-    /// Another heading must raise the share by this much to be believed.
-    pub min_turn_gain: f64,
     /// A fit with this share of returns on surfaces needs no search.
     pub good_inlier_share: f64,
     /// A fit with a smaller share is not believed: odometry stands.
@@ -174,8 +166,6 @@ pub struct RefinerConfig {
 impl Default for RefinerConfig {
     fn default() -> Self {
         Self {
-            motion_distance_m: 0.03,
-            motion_turn_rad: 0.01,
             keyframe_distance_m: 0.2,
             keyframe_turn_rad: 0.175,
             window_m: 12.0,
@@ -190,8 +180,6 @@ impl Default for RefinerConfig {
             first_outlier_m: 0.3,
             max_iterations: 10,
             correlated_returns: 3.0,
-            sure_inlier_share: 0.85,
-            min_turn_gain: 0.05,
             good_inlier_share: 0.7,
             min_inlier_share: 0.3,
             min_search_gain: 0.1,
@@ -239,8 +227,6 @@ impl RefinerConfig {
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
         let positive = [
-            ("motion_distance_m", self.motion_distance_m),
-            ("motion_turn_rad", self.motion_turn_rad),
             ("keyframe_distance_m", self.keyframe_distance_m),
             ("keyframe_turn_rad", self.keyframe_turn_rad),
             ("window_m", self.window_m),

@@ -14,6 +14,8 @@ pub(crate) struct AlignmentSettings {
     pub outlier_m: f64,
     /// The same at the first step, metres.
     pub first_outlier_m: f64,
+    /// Points that a surface must rest on.
+    pub min_count: i32,
     /// Steps at most.
     pub max_iterations: usize,
     /// Neighbouring returns err together: this many count as one independent measurement.
@@ -74,7 +76,7 @@ pub(crate) fn align(
         let step = factor.solve(&-(gradient + prior * offset));
         pose = Pose2::new(pose.x + step.x, pose.y + step.y, pose.theta + step.z);
         let is_annealed = outlier_m <= settings.outlier_m;
-        if is_annealed && step.x.abs() < 5e-4 && step.y.abs() < 5e-4 && step.z.abs() < 5e-5 {
+        if is_annealed && step.x.abs() < 2e-4 && step.y.abs() < 2e-4 && step.z.abs() < 2e-5 {
             result.map_from_points = pose;
             break;
         }
@@ -97,7 +99,7 @@ fn linearize(
     for point in points {
         let (rx, ry) = (cos * point.x - sin * point.y, sin * point.x + cos * point.y);
         let placed = Point2::new(pose.x + rx, pose.y + ry);
-        let Some(surface) = map.surface_at(&placed) else { continue };
+        let Some(surface) = map.surface_at(&placed, settings.min_count) else { continue };
         let n = surface.normal;
         let residual = n.x * (placed.x - surface.mean.x) + n.y * (placed.y - surface.mean.y);
         if residual.abs() < settings.outlier_m {

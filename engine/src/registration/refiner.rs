@@ -43,17 +43,11 @@ struct Anchor {
     run_from_robot: Pose2,
 }
 
-/// A surface rests on this many points at least.
-const MIN_POINTS_OF_SURFACE: i32 = 3;
-
 /// What is kept of a refiner between processes; the surface map follows from the scans.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct RefinerState {
     config: RefinerConfig,
-    /// The last registered scan, from which odometry goes on.
     anchor: Option<Anchor>,
-    /// Pose in the run of the last keyframe.
-    run_from_keyframe: Pose2,
     travel_mm: u64,
     recent: VecDeque<RecentScan>,
 }
@@ -68,10 +62,12 @@ pub struct OdometryRefiner {
 
 impl From<RefinerState> for OdometryRefiner {
     fn from(state: RefinerState) -> Self {
-        let mut surfaces = SurfaceMap::new(state.config.cell_m, MIN_POINTS_OF_SURFACE);
-        let points =
-            state.recent.iter().flat_map(|scan| &scan.points_mm).map(|point| from_millimetres(*point));
-        surfaces.update(points, std::iter::empty());
+        let mut surfaces = SurfaceMap::new(state.config.cell_m);
+        for scan in &state.recent {
+            for point in &scan.points_mm {
+                surfaces.insert(&from_millimetres(*point));
+            }
+        }
         Self { state, surfaces }
     }
 }
@@ -85,21 +81,13 @@ impl From<OdometryRefiner> for RefinerState {
 impl OdometryRefiner {
     /// A refiner that has seen nothing.
     pub fn new(config: &RefinerConfig) -> Self {
-        RefinerState {
-            config: config.clone(),
-            anchor: None,
-            run_from_keyframe: Pose2::identity(),
-            travel_mm: 0,
-            recent: VecDeque::new(),
-        }
-        .into()
+        RefinerState { config: config.clone(), anchor: None, travel_mm: 0, recent: VecDeque::new() }.into()
     }
 
     /// Takes the next scan of the run.
     ///
-    /// Every scan after a little motion is registered; after more it becomes a keyframe and joins the recent scans. In
-    /// between the pose is the last one composed with odometry. A scan that fits badly keeps its odometry, with a
-    /// covariance that says so.
+    /// Between keyframes the pose is the last keyframe's composed with odometry. A scan that fits the recent scans
+    /// badly keeps its odometry, with a covariance that says so.
     pub fn refine(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Refined {
         let Some(anchor) = self.state.anchor else {
             return self.start(geometry, scan);
@@ -107,26 +95,19 @@ impl OdometryRefiner {
         let motion = anchor.odom_from_robot.between(&scan.odom_from_robot);
         let predicted = anchor.run_from_robot.compose(&motion);
         let config = &self.state.config;
-        let has_moved = motion.x.hypot(motion.y) >= config.motion_distance_m
-            || motion.theta.abs() >= config.motion_turn_rad;
-        let since_keyframe = self.state.run_from_keyframe.between(&predicted);
-        let distance_m = since_keyframe.x.hypot(since_keyframe.y);
-        let is_keyframe = distance_m >= config.keyframe_distance_m
-            || since_keyframe.theta.abs() >= config.keyframe_turn_rad;
-        if !has_moved && !is_keyframe {
+        let distance_m = motion.x.hypot(motion.y);
+        if distance_m < config.keyframe_distance_m && motion.theta.abs() < config.keyframe_turn_rad {
             return Refined { run_from_robot: predicted, keyframe: None };
         }
         let points = self.points_of(geometry, scan);
         let odometry_covariance = config.odometry.covariance(&motion);
         let alignment = self.register(&points, &anchor.run_from_robot, &predicted, &odometry_covariance);
-        let run_from_robot = alignment.as_ref().map_or(predicted, |alignment| alignment.map_from_points);
-        self.state.anchor = Some(Anchor { odom_from_robot: scan.odom_from_robot, run_from_robot });
-        if !is_keyframe {
-            return Refined { run_from_robot, keyframe: None };
-        }
-        let covariance = match alignment.and_then(|alignment| alignment.information.try_inverse()) {
-            Some(in_run) => rotated(&in_run, -self.state.run_from_keyframe.theta),
-            None => config.odometry.covariance(&since_keyframe),
+        let (run_from_robot, covariance) = match alignment {
+            Some(alignment) => {
+                let in_run = alignment.information.try_inverse().unwrap_or(odometry_covariance);
+                (alignment.map_from_points, rotated(&in_run, -anchor.run_from_robot.theta))
+            }
+            None => (predicted, odometry_covariance),
         };
         self.state.travel_mm += (distance_m * 1000.0).round() as u64;
         self.keep(&points, run_from_robot, scan.odom_from_robot);
@@ -174,20 +155,11 @@ impl OdometryRefiner {
             noise_m: config.noise_m,
             outlier_m: config.outlier_m,
             first_outlier_m: config.first_outlier_m,
+            min_count: 3,
             max_iterations: config.max_iterations,
             correlated_returns: config.correlated_returns,
         };
-        let mut first = align(&self.surfaces, points, predicted, &prior, predicted, &settings);
-        if first.inlier_share < config.sure_inlier_share {
-            // Wheels slip when turning: the heading may be off by more than the alignment can walk.
-            for turn_rad in [-0.24, -0.12, 0.12, 0.24] {
-                let turned = Pose2::new(predicted.x, predicted.y, predicted.theta + turn_rad);
-                let other = align(&self.surfaces, points, predicted, &prior, &turned, &settings);
-                if other.inlier_share > first.inlier_share + config.min_turn_gain {
-                    first = other;
-                }
-            }
-        }
+        let first = align(&self.surfaces, points, predicted, &prior, predicted, &settings);
         if first.inlier_share >= config.good_inlier_share {
             return Some(first);
         }
@@ -217,22 +189,20 @@ impl OdometryRefiner {
 
     fn keep(&mut self, points: &[Point2], run_from_robot: Pose2, odom_from_robot: Pose2) {
         let points_mm: Vec<_> = transformed(points, &run_from_robot).iter().map(to_millimetres).collect();
+        for point in &points_mm {
+            self.surfaces.insert(&from_millimetres(*point));
+        }
         self.state.recent.push_back(RecentScan { travel_mm: self.state.travel_mm, points_mm });
         self.state.anchor = Some(Anchor { odom_from_robot, run_from_robot });
-        self.state.run_from_keyframe = run_from_robot;
         let window_mm = (self.state.config.window_m * 1000.0) as u64;
-        let mut forgotten = Vec::new();
         while self.state.recent.len() > self.state.config.max_scans
             || self.state.recent.front().is_some_and(|scan| scan.travel_mm + window_mm < self.state.travel_mm)
         {
             let Some(old) = self.state.recent.pop_front() else { break };
-            forgotten.extend(old.points_mm);
+            for point in &old.points_mm {
+                self.surfaces.remove(&from_millimetres(*point));
+            }
         }
-        let added = self.state.recent.back().into_iter().flat_map(|scan| &scan.points_mm);
-        self.surfaces.update(
-            added.map(|point| from_millimetres(*point)),
-            forgotten.iter().map(|point| from_millimetres(*point)),
-        );
     }
 }
 

@@ -49,6 +49,7 @@ pub fn refine_from(
         noise_m: config.noise_m,
         outlier_m: config.outlier_m,
         first_outlier_m: config.first_outlier_m,
+        min_count: config.min_count,
         max_iterations: config.max_iterations,
         correlated_returns: config.correlated_returns,
     };

@@ -37,7 +37,7 @@ impl Submap {
         frame_from_anchor: &Pose2,
         config: &SubmapConfig,
     ) -> Self {
-        let mut surfaces = SurfaceMap::new(config.cell_m, config.min_count);
+        let mut surfaces = SurfaceMap::new(config.cell_m);
         let mut evidence = EvidenceGrid::new(config.radius_m, config.evidence_cell_m);
         let mut all_points = Vec::new();
         for scan in scans {
@@ -51,11 +51,11 @@ impl Submap {
                 config.max_points,
             );
             for point in transformed(&points, &anchor_from_robot) {
+                surfaces.insert(&point);
                 evidence.add_beam(&laser, &point);
                 all_points.push(point);
             }
         }
-        surfaces.update(all_points.iter().copied(), std::iter::empty());
         let pyramid = SearchPyramid::new(&evidence);
         let fine_points = spread(&all_points, config.fine_spacing_m, f64::INFINITY);
         let coarse_points = spread(&all_points, config.coarse_spacing_m, config.radius_m);

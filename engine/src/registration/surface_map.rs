@@ -57,44 +57,21 @@ pub(crate) struct Surface {
     pub along_m2: f64,
 }
 
-/// Moments of points per cell, and the surfaces that follow from them.
+/// Moments of points per cell.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SurfaceMap {
     cell_m: f64,
-    min_count: i32,
     cells: HashMap<Cell, Moments, BuildHasherDefault<CellHasher>>,
-    surfaces: HashMap<Cell, Surface, BuildHasherDefault<CellHasher>>,
 }
 
 impl SurfaceMap {
-    /// An empty map of cells with this edge length; a surface rests on at least `min_count` points.
-    pub fn new(cell_m: f64, min_count: i32) -> Self {
-        Self { cell_m, min_count, cells: HashMap::default(), surfaces: HashMap::default() }
+    /// An empty map of cells with this edge length.
+    pub fn new(cell_m: f64) -> Self {
+        Self { cell_m, cells: HashMap::default() }
     }
 
-    /// Adds and removes points, then fits the surfaces anew that they touch.
-    pub fn update(&mut self, added: impl Iterator<Item = Point2>, removed: impl Iterator<Item = Point2>) {
-        let mut touched: Vec<Cell> = added.map(|point| self.insert(&point)).collect();
-        touched.extend(removed.map(|point| self.remove(&point)));
-        touched.sort_unstable();
-        touched.dedup();
-        let mut around: Vec<Cell> = touched
-            .iter()
-            .flat_map(|&(column, row)| {
-                (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| (column + dx, row + dy)))
-            })
-            .collect();
-        around.sort_unstable();
-        around.dedup();
-        for cell in around {
-            match self.fit(cell) {
-                Some(surface) => self.surfaces.insert(cell, surface),
-                None => self.surfaces.remove(&cell),
-            };
-        }
-    }
-
-    fn insert(&mut self, point: &Point2) -> Cell {
+    /// Adds a point.
+    pub fn insert(&mut self, point: &Point2) {
         let (cell, x, y) = self.locate(point);
         let moments = self.cells.entry(cell).or_default();
         moments.count += 1;
@@ -103,11 +80,10 @@ impl SurfaceMap {
         moments.xx += x * x;
         moments.xy += x * y;
         moments.yy += y * y;
-        cell
     }
 
     /// Takes a point away that was added before.
-    fn remove(&mut self, point: &Point2) -> Cell {
+    pub fn remove(&mut self, point: &Point2) {
         let (cell, x, y) = self.locate(point);
         if let Some(moments) = self.cells.get_mut(&cell) {
             moments.count -= 1;
@@ -120,15 +96,12 @@ impl SurfaceMap {
                 self.cells.remove(&cell);
             }
         }
-        cell
     }
 
-    /// The surface near `point`: a line through the points of the 3 × 3 cells around it, if enough lie there.
-    pub fn surface_at(&self, point: &Point2) -> Option<&Surface> {
-        self.surfaces.get(&self.cell_of(point))
-    }
-
-    fn fit(&self, (column, row): Cell) -> Option<Surface> {
+    /// The surface near `point`: a line through the points of the 3 × 3 cells around it, or none when fewer than
+    /// `min_count` lie there.
+    pub fn surface_at(&self, point: &Point2, min_count: i32) -> Option<Surface> {
+        let (column, row) = self.cell_of(point);
         let step = (self.cell_m * 1000.0).round();
         let mut sum = [0.0f64; 6];
         for dy in -1..=1i32 {
@@ -145,7 +118,7 @@ impl SurfaceMap {
                 sum[5] += f64::from(m.yy) + 2.0 * oy * sy + n * oy * oy;
             }
         }
-        if sum[0] < f64::from(self.min_count) {
+        if sum[0] < f64::from(min_count) {
             return None;
         }
         let (mx, my) = (sum[1] / sum[0], sum[2] / sum[0]);
