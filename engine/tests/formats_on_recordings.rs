@@ -45,7 +45,7 @@ fn every_recording_reads_with_its_documented_shape() {
         let text = gunzipped(folder.join(format!("{name}.log.gz")));
         let log = read_carmen_log(text.lines(), &CarmenOptions::default()).unwrap();
         assert_eq!((log.scans.len(), log.geometry.num_ranges), (num_scans, num_ranges), "{name}");
-        assert!((log.geometry.range_max_m - range_max_m).abs() < 1e-4, "{name}: {:?}", log.geometry);
+        assert!((log.geometry.range_max_m - range_max_m).abs() < 0.02, "{name}: {:?}", log.geometry);
         let mounting = log.geometry.robot_from_laser;
         assert!(
             (mounting.x - laser_ahead_m).abs() < 0.005 && mounting.y.abs() < 0.005,

@@ -123,7 +123,7 @@ mod tests {
         for (file, name) in [
             ("/data/laser/intel.log.gz", "intel"),
             ("first floor (1).clf", "first-floor--1-"),
-            (".log", "log"),
+            (".log", "run"),
             ("wean1.log", "wean1"),
         ] {
             assert_eq!(run_name(Path::new(file)), name);
