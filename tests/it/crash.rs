@@ -60,7 +60,7 @@ fn binary() -> PathBuf {
         return path.into();
     }
     let build = escargot::CargoBuild::new().package("locution-server").bin("locution").release();
-    build.current_target().run().unwrap().path().to_owned()
+    build.run().unwrap().path().to_owned()
 }
 
 async fn post(api: &Api, first: usize, scans: &[Value]) -> Option<Value> {
