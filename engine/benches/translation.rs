@@ -20,7 +20,7 @@ use locution_engine::config::TranslatorConfig;
 use locution_engine::density::{DensityConfig, DensityEstimator, KernelConfig};
 use locution_engine::formats::{CarmenOptions, read_carmen_log};
 use locution_engine::geometry::{Point2, Pose2};
-use locution_engine::grid::{Cell, LocalMap, LocalMapConfig};
+use locution_engine::grid::{LocalMap, LocalMapConfig};
 use locution_engine::sampling::SamplingConfig;
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;

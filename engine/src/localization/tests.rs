@@ -118,12 +118,12 @@ fn fields_take_few_bytes_per_free_cell() {
 
 /// A drive along the corridor, through the door and round the larger room.
 pub(super) fn drive() -> Vec<Pose2> {
-    let corners = [(-3.0, 8.7), (-1.5, 8.7), (-1.5, 11.0), (-0.3, 14.3), (-2.6, 14.3), (-2.6, 11.0)];
+    let corners: [(f64, f64); 6] =
+        [(-3.0, 8.7), (-1.5, 8.7), (-1.5, 11.0), (-0.3, 14.3), (-2.6, 14.3), (-2.6, 11.0)];
     let mut poses = Vec::new();
     for pair in corners.windows(2) {
         let ((x0, y0), (x1, y1)) = (pair[0], pair[1]);
-        let (heading, length): (f64, f64) =
-            ((y1 - y0 as f64).atan2(x1 - x0 as f64), (x1 - x0 as f64).hypot(y1 - y0));
+        let (heading, length): (f64, f64) = ((y1 - y0).atan2(x1 - x0), (x1 - x0).hypot(y1 - y0));
         let num_steps = (length / 0.1) as usize;
         poses.extend((0..num_steps).map(|step| {
             let share = step as f64 / num_steps as f64;

@@ -164,7 +164,7 @@ impl<'a> Reweighting<'a> {
             let change = self.reweight(|chi2| truncated_weight(chi2, bound, sharpness));
             let is_binary = |&index: &usize| {
                 let weight = self.problem.weights[index];
-                weight < WEIGHT_TOLERANCE || weight > 1.0 - WEIGHT_TOLERANCE
+                !(WEIGHT_TOLERANCE..=1.0 - WEIGHT_TOLERANCE).contains(&weight)
             };
             if sharpness > 1.0 && change < WEIGHT_TOLERANCE && self.doubtful.iter().all(is_binary) {
                 return Ok(());
