@@ -178,11 +178,15 @@ impl Lattice {
         (index != u32::MAX).then_some(WordId { level: level as u8, index })
     }
 
+    /// The node a word ends at.
+    pub fn end_of(&self, id: WordId) -> Option<usize> {
+        self.levels.get(usize::from(id.level))?.ends.get(id.index as usize).map(|&end| end as usize)
+    }
+
     /// First and last observation of a word, both inclusive.
     pub fn observations_of(&self, id: WordId) -> Option<(u32, u32)> {
-        let level = usize::from(id.level);
-        let end = *self.levels.get(level)?.ends.get(id.index as usize)? as usize;
-        Some(self.observations(end + 1 - num_nodes_covered(level), end))
+        let end = self.end_of(id)?;
+        Some(self.observations(end + 1 - num_nodes_covered(usize::from(id.level)), end))
     }
 
     /// First and last observation of a stretch of nodes, both inclusive.

@@ -4,7 +4,9 @@ mod alignment;
 mod chain;
 mod claim;
 mod config;
+mod evidence;
 mod rows;
+mod run_match;
 
 #[cfg(test)]
 mod chain_tests;
@@ -13,3 +15,5 @@ pub use alignment::{Alignment, align_words};
 pub use chain::{Chain, ChainFinder, Relation, find_chains};
 pub use claim::{ObservationPair, aligned_nodes, chain_stretches, claimed_pairs};
 pub use config::MatchingConfig;
+pub use evidence::{ChainEvidence, TextStatistics};
+pub use run_match::{RunMatch, match_run};
