@@ -128,3 +128,9 @@ pub fn percentiles(micros: &mut [f64]) -> (f64, f64) {
     micros.sort_by(f64::total_cmp);
     (micros[micros.len() / 2], micros[micros.len() * 99 / 100])
 }
+
+/// Seconds that this thread has computed, which other work on the machine does not lengthen.
+pub fn cpu_seconds() -> f64 {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    time.tv_sec as f64 + time.tv_nsec as f64 * 1e-9
+}

@@ -45,34 +45,55 @@ pub const fn num_nodes_covered(level: usize) -> usize {
     if level == 0 { 1 } else { level + 2 }
 }
 
-/// The words of one level, one entry per node.
+/// The words of one level: by the node they end at, and in a row.
 #[derive(Clone, Debug, Default)]
 pub struct LevelColumns {
-    /// Density class, or no word's class where no word of this level ends.
+    /// One entry per node; no word's class where no word of this level ends.
+    pub by_node: WordColumns,
+    /// One entry per word, by its index within the level.
+    pub in_row: WordColumns,
+    /// Where each word of the level ends, by its index.
+    pub ends: Vec<u32>,
+    /// Index of the word within its level, one entry per node.
+    index: Vec<u32>,
+}
+
+/// Words as columns of their syllables.
+#[derive(Clone, Debug, Default)]
+pub struct WordColumns {
+    /// Density class.
     pub class: Vec<u16>,
     /// Number of observations.
     pub size: Vec<u16>,
     /// Turn as a binary angle.
     pub turn: Vec<i16>,
-    /// Index of the word within its level.
-    index: Vec<u32>,
-    /// Where each word of the level ends, by its index.
-    ends: Vec<u32>,
+}
+
+impl WordColumns {
+    /// Classes, sizes and turns of a range of entries, which must lie within them.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> (&[u16], &[u16], &[i16]) {
+        (&self.class[range.clone()], &self.size[range.clone()], &self.turn[range])
+    }
+
+    fn push(&mut self, word: Syllables) {
+        self.class.push(word.class);
+        self.size.push(word.size);
+        self.turn.push(word.turn);
+    }
 }
 
 impl LevelColumns {
     fn push_absent(&mut self) {
-        self.class.push(ABSENT);
-        self.size.push(0);
-        self.turn.push(0);
+        self.by_node.push(Syllables { class: ABSENT, size: 0, turn: 0 });
         self.index.push(u32::MAX);
     }
 
     fn set(&mut self, node: usize, word: &Word) {
         let syllables = Syllables::of(word);
-        self.class[node] = syllables.class;
-        self.size[node] = syllables.size;
-        self.turn[node] = syllables.turn;
+        self.by_node.class[node] = syllables.class;
+        self.by_node.size[node] = syllables.size;
+        self.by_node.turn[node] = syllables.turn;
+        self.in_row.push(syllables);
         self.index[node] = word.id.index;
         self.ends.push(node as u32);
     }
@@ -157,7 +178,7 @@ impl Lattice {
 
     /// Number of words over all levels.
     pub fn num_words(&self) -> usize {
-        self.levels.iter().map(|level| level.class.iter().filter(|&&class| class != ABSENT).count()).sum()
+        self.levels.iter().map(|level| level.ends.len()).sum()
     }
 
     /// The columns of a level; empty for a level that no word has.
@@ -167,7 +188,7 @@ impl Lattice {
 
     /// The word of `level` that ends at `node`, if there is one.
     pub fn word_ending_at(&self, node: usize, level: usize) -> Option<Syllables> {
-        let columns = self.levels.get(level)?;
+        let columns = &self.levels.get(level)?.by_node;
         let class = *columns.class.get(node)?;
         (class != ABSENT).then(|| Syllables { class, size: columns.size[node], turn: columns.turn[node] })
     }

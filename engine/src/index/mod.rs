@@ -8,15 +8,17 @@ mod occurrence;
 mod packed;
 mod pattern;
 mod radix;
+mod reading;
 mod search;
 mod tolerance;
 
 #[cfg(test)]
 mod search_tests;
 
-pub use lattice::{Lattice, LatticeError, LevelColumns, num_nodes_covered};
+pub use lattice::{Lattice, LatticeError, LevelColumns, WordColumns, num_nodes_covered};
 pub use occurrence::OccurrenceIndex;
 pub use packed::{STORED_WORD_BYTES, store_words};
 pub use pattern::{TextQuery, WordConstraint};
+pub use reading::{ReadWord, TextReading};
 pub use search::TextMatch;
 pub use tolerance::{Syllables, WordTolerance, WordWindow, binary_angle};

@@ -8,11 +8,13 @@
 //!   the codes of the pair.
 //!
 //! A word's code is coarse, so a tolerance is a few ranges of codes; whoever finds a place looks at the words there.
-//! Costs twelve bytes a word, four a level-0 word and four a pair through alternatives.
+//! Most looks are saved by what stands beside a place in its list: the classes of the words around the pair. An
+//! alternative word has the class of its first and of its last word (Algorithm 5.2), so they are the same whichever
+//! way the text around is read. Costs twelve bytes a word, six a level-0 word and six a pair through alternatives.
 
 use super::lattice::Lattice;
 use super::packed::{PackedWord, load_words, store_words};
-use super::radix::sort_by_key;
+use super::radix::{Keyed, sort_by_key};
 use super::tolerance::Syllables;
 use crate::text::Interval;
 
@@ -32,12 +34,46 @@ pub struct OccurrenceIndex {
     num_key_words: usize,
     /// The highest level that a word has.
     max_level: usize,
+    /// Level-0 words before every [`BLOCK_WORDS`]th word, so that a word's number is counted within a block.
+    nodes_before_block: Vec<u32>,
+}
+
+/// Words between two entries of the table of level-0 words.
+const BLOCK_WORDS: usize = 256;
+
+/// The class around a pair of words where the text begins or ends there; classes are kept modulo 64.
+const NO_CLASS: u8 = 64;
+
+/// Sets of classes around a pair of words, one bit per class.
+pub(super) type ClassSet = u128;
+
+/// Places that stand together in a list.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Places<'a> {
+    places: &'a [u32],
+    contexts: &'a [[u8; 2]],
+}
+
+impl<'a> Places<'a> {
+    /// How many they are.
+    pub fn len(&self) -> usize {
+        self.places.len()
+    }
+
+    /// Those with one of the given classes before the pair and one of the given classes behind it.
+    pub fn within(self, [before, behind]: [ClassSet; 2]) -> impl Iterator<Item = u32> + 'a {
+        let is_within = move |context: &[u8; 2]| (before >> context[0]) & (behind >> context[1]) & 1 != 0;
+        let pairs = self.places.iter().zip(self.contexts);
+        pairs.filter(move |(_, context)| is_within(context)).map(|(place, _)| *place)
+    }
 }
 
 /// Places ordered by the ranks of a pair of words.
 #[derive(Clone, Debug, Default)]
 struct PairList {
     places: Vec<u32>,
+    /// For each place, the classes of the level-0 words before and behind the pair.
+    contexts: Vec<[u8; 2]>,
     /// For each pair of ranks that occurs, the second rank and where its places begin; ordered.
     pairs: Vec<(u16, u32)>,
     /// For each first rank, where its pairs begin; one entry more at the end.
@@ -61,6 +97,14 @@ impl OccurrenceIndex {
             load_words(run, &mut index.words)?;
         }
         u32::try_from(index.words.len()).ok()?;
+        for block in index.words.chunks(BLOCK_WORDS) {
+            let last = index.nodes_before_block.last().copied().unwrap_or(0);
+            let num_nodes = block.iter().filter(|word| word.is_node()).count() as u32;
+            if index.nodes_before_block.is_empty() {
+                index.nodes_before_block.push(0);
+            }
+            index.nodes_before_block.push(last + num_nodes);
+        }
         index.max_level = index.words.iter().map(PackedWord::level).max().unwrap_or(0);
         index.rank_codes();
         let num_bits = index.codes.len().max(1).ilog2() + 1;
@@ -78,11 +122,11 @@ impl OccurrenceIndex {
     /// Bytes in memory.
     pub fn num_bytes(&self) -> usize {
         let lists = [&self.plain, &self.fused].map(|list| {
-            4 * (list.places.capacity() + list.first_ranks.capacity()) + 8 * list.pairs.capacity()
+            6 * list.places.capacity() + 4 * list.first_ranks.capacity() + 8 * list.pairs.capacity()
         });
         size_of::<PackedWord>() * self.words.capacity()
             + lists.iter().sum::<usize>()
-            + 4 * self.run_starts.capacity()
+            + 4 * (self.run_starts.capacity() + self.nodes_before_block.capacity())
             + 2 * self.codes.capacity()
     }
 
@@ -104,11 +148,12 @@ impl OccurrenceIndex {
         let Some(ranks) = ranks else { return &[] };
         let Some(&first) = ranks.first() else { return &[] };
         let mut places = match ranks.get(1) {
-            Some(&second) => self.plain.of_pair(first, second),
-            None => self.plain.of_first(first),
+            Some(&second) => self.plain.of_pairs(first, second..second + 1).places,
+            None => self.plain.of_first(first).places,
         };
         for depth in 2..ranks.len().min(self.num_key_words) {
-            let rank_there = |position: u32| self.nodes_from(position as usize).nth(depth).map(|word| word.rank);
+            let rank_there =
+                |position: u32| self.nodes_from(position as usize).nth(depth).map(|word| word.rank);
             let start = places.partition_point(|&position| rank_there(position) < Some(ranks[depth]));
             let end = places.partition_point(|&position| rank_there(position) <= Some(ranks[depth]));
             places = &places[start..end];
@@ -142,6 +187,20 @@ impl OccurrenceIndex {
         Interval { run_idx: run as u32, first: self.words[position].first_observation, last }
     }
 
+    /// Positions of the words of a run.
+    pub(super) fn run_range(&self, run_idx: usize) -> Option<std::ops::Range<usize>> {
+        let start = *self.run_starts.get(run_idx)? as usize;
+        Some(start..self.run_starts.get(run_idx + 1).map_or(self.words.len(), |&end| end as usize))
+    }
+
+    /// Level-0 words before a position, over all runs.
+    pub(super) fn num_nodes_before(&self, position: usize) -> usize {
+        let block = position / BLOCK_WORDS;
+        let counted = self.nodes_before_block.get(block).map_or(0, |&count| count as usize);
+        let rest = &self.words[block * BLOCK_WORDS..position];
+        counted + rest.iter().filter(|word| word.is_node()).count()
+    }
+
     /// The highest level that a word has.
     pub(super) fn max_level(&self) -> usize {
         self.max_level
@@ -153,61 +212,82 @@ impl OccurrenceIndex {
     }
 
     /// Level-0 words, as positions, that are followed by another so that the pair has these ranks.
-    pub(super) fn plain_pairs(&self, first: u16, second: std::ops::Range<u16>) -> &[u32] {
+    pub(super) fn plain_pairs(&self, first: u16, second: std::ops::Range<u16>) -> Places<'_> {
         self.plain.of_pairs(first, second)
     }
 
     /// Boundaries, as the positions of the level-0 words behind them, that are crossed by a pair with these ranks.
-    pub(super) fn fused_pairs(&self, first: u16, second: std::ops::Range<u16>) -> &[u32] {
+    pub(super) fn fused_pairs(&self, first: u16, second: std::ops::Range<u16>) -> Places<'_> {
         self.fused.of_pairs(first, second)
     }
 
     fn rank_codes(&mut self) {
         let mut occurs = vec![false; 1 << 16];
-        self.words.iter().for_each(|word| occurs[usize::from(word.code())] = true);
+        for word in &mut self.words {
+            word.rank = word.code();
+            occurs[usize::from(word.rank)] = true;
+        }
         self.codes = (0..=u16::MAX).filter(|&code| occurs[usize::from(code)]).collect();
         let mut ranks = vec![0u16; 1 << 16];
         for (rank, &code) in self.codes.iter().enumerate() {
             ranks[usize::from(code)] = rank as u16;
         }
-        self.words.iter_mut().for_each(|word| word.rank = ranks[usize::from(word.code())]);
+        self.words.iter_mut().for_each(|word| word.rank = ranks[usize::from(word.rank)]);
     }
 
     /// Every level-0 word by its key: the ranks, plus one, of the words from there on; 0 behind the end of a run.
     fn plain_list(&self, num_bits: u32) -> PairList {
         let num_nodes = self.words.iter().filter(|word| word.is_node()).count();
-        let mut keyed = Vec::with_capacity(num_nodes);
+        let mut keyed: Vec<Keyed> = Vec::with_capacity(num_nodes);
         let top = num_bits * (self.num_key_words as u32 - 1);
         let mut key = 0u64;
-        for (position, word) in self.words.iter().enumerate().rev() {
-            if word.is_node() {
-                key = (u64::from(word.rank) + 1) << top | key >> num_bits;
-                keyed.push((key, position as u32));
+        // Classes of the two level-0 words behind the one that is visited.
+        let mut behind = [NO_CLASS; 2];
+        for (position, word) in self.words.iter().enumerate().rev().filter(|(_, word)| word.is_node()) {
+            let class = word.class & 63;
+            if behind[0] != NO_CLASS
+                && let Some(next) = keyed.last_mut()
+            {
+                next.context[0] = class;
             }
+            key = (u64::from(word.rank) + 1) << top | key >> num_bits;
+            keyed.push(Keyed { key, place: position as u32, context: [NO_CLASS, behind[1]] });
+            behind = [class, behind[0]];
             if word.is_first_of_run() {
-                key = 0;
+                (key, behind) = (0, [NO_CLASS; 2]);
             }
         }
-        keyed.reverse();
-        let sorted = sort_by_key(keyed, num_bits * self.num_key_words as u32);
+        sort_by_key(&mut keyed, num_bits * self.num_key_words as u32);
         let shift = top - num_bits.min(top);
-        PairList::from_sorted(&sorted, self.codes.len(), |key| ((key >> shift) >> num_bits, (key >> shift)), num_bits)
+        PairList::from_sorted(
+            &keyed,
+            self.codes.len(),
+            |key| (key >> shift >> num_bits, key >> shift),
+            num_bits,
+        )
     }
 
     /// Every boundary by the pairs of words across it of which not both are level-0 words.
     fn fused_list(&self, num_bits: u32) -> PairList {
         let mut keyed = Vec::new();
         for (position, word) in self.words.iter().enumerate() {
-            let Some(boundary) = self.start_of(position) else { continue };
+            let boundary = if word.is_node() { Some(position) } else { self.start_of(position) };
+            let Some(boundary) = boundary else { continue };
             let Some(group) = self.group_before(boundary) else { continue };
-            for before in self.words[group].iter().filter(|before| !(before.is_node() && word.is_node())) {
-                let key = (u64::from(before.rank) + 1) << num_bits | (u64::from(word.rank) + 1);
-                keyed.push((key, boundary as u32));
+            let class_behind =
+                || self.next_node(position).map_or(NO_CLASS, |next| self.words[next].class & 63);
+            for before in group {
+                if self.words[before].is_node() && word.is_node() {
+                    continue;
+                }
+                let class_before = (self.start_of(before).and_then(|start| self.group_before(start)))
+                    .map_or(NO_CLASS, |group| self.words[group.start].class & 63);
+                let key = (u64::from(self.words[before].rank) + 1) << num_bits | (u64::from(word.rank) + 1);
+                keyed.push(Keyed { key, place: boundary as u32, context: [class_before, class_behind()] });
             }
         }
-        let mut sorted = sort_by_key(keyed, 2 * num_bits);
-        sorted.dedup();
-        PairList::from_sorted(&sorted, self.codes.len(), |key| (key >> num_bits, key), num_bits)
+        sort_by_key(&mut keyed, 2 * num_bits);
+        PairList::from_sorted(&keyed, self.codes.len(), |key| (key >> num_bits, key), num_bits)
     }
 
     /// Position of the level-0 word with which the word at a position begins.
@@ -247,16 +327,20 @@ impl OccurrenceIndex {
 impl PairList {
     /// Groups places that are sorted by key; `ranks_plus_one` gives a key's pair in its lowest `num_bits` bits.
     fn from_sorted(
-        sorted: &[(u64, u32)],
+        sorted: &[Keyed],
         num_codes: usize,
         ranks_plus_one: impl Fn(u64) -> (u64, u64),
         num_bits: u32,
     ) -> Self {
         let mask = (1u64 << num_bits) - 1;
-        let mut list = Self { places: sorted.iter().map(|pair| pair.1).collect(), ..Self::default() };
+        let mut list = Self {
+            places: sorted.iter().map(|keyed| keyed.place).collect(),
+            contexts: sorted.iter().map(|keyed| keyed.context).collect(),
+            ..Self::default()
+        };
         list.first_ranks.push(0);
         let mut last = None;
-        for (place, &(key, _)) in sorted.iter().enumerate() {
+        for (place, &Keyed { key, .. }) in sorted.iter().enumerate() {
             let (first, second) = ranks_plus_one(key);
             let pair = ((first & mask) as usize, (second & mask) as u16);
             if last == Some(pair) {
@@ -281,22 +365,19 @@ impl PairList {
         }
     }
 
-    fn places_of(&self, pairs: std::ops::Range<usize>) -> &[u32] {
+    fn places_of(&self, pairs: std::ops::Range<usize>) -> Places<'_> {
         let place_of = |pair: usize| self.pairs.get(pair).map_or(self.places.len(), |pair| pair.1 as usize);
-        &self.places[place_of(pairs.start)..place_of(pairs.end)]
+        let range = place_of(pairs.start)..place_of(pairs.end);
+        Places { places: &self.places[range.clone()], contexts: &self.contexts[range] }
     }
 
     /// Places by first rank alone.
-    fn of_first(&self, first: u16) -> &[u32] {
+    fn of_first(&self, first: u16) -> Places<'_> {
         self.places_of(self.pairs_of(first))
     }
 
-    fn of_pair(&self, first: u16, second: u16) -> &[u32] {
-        self.of_pairs(first, second..second + 1)
-    }
-
     /// Places by first rank and a range of second ranks.
-    fn of_pairs(&self, first: u16, second: std::ops::Range<u16>) -> &[u32] {
+    fn of_pairs(&self, first: u16, second: std::ops::Range<u16>) -> Places<'_> {
         let range = self.pairs_of(first);
         let pairs = &self.pairs[range.clone()];
         // Second ranks are kept plus one.

@@ -46,6 +46,11 @@ impl PackedWord {
         self.first_observation.saturating_add(u32::from(self.size).saturating_sub(1))
     }
 
+    /// The word as it is stored.
+    pub fn to_stored(self) -> [u8; STORED_WORD_BYTES] {
+        stored_word(&self.syllables(), self.level(), self.first_observation)
+    }
+
     /// A coarse name of the word, class before size before turn, so that similar words have neighbouring codes.
     pub fn code(&self) -> u16 {
         code_of(self.class, self.size, self.turn)
@@ -79,14 +84,16 @@ pub fn store_words(lattice: &Lattice) -> Vec<u8> {
         for level in 0..lattice.num_levels() {
             let Some(word) = lattice.word_ending_at(node, level) else { continue };
             let (first, _) = lattice.observations(node + 1 - num_nodes_covered(level), node);
-            bytes.push(word.class as u8);
-            bytes.push(level as u8);
-            bytes.extend_from_slice(&word.size.to_le_bytes());
-            bytes.extend_from_slice(&word.turn.to_le_bytes());
-            bytes.extend_from_slice(&first.to_le_bytes());
+            bytes.extend_from_slice(&stored_word(&word, level, first));
         }
     }
     bytes
+}
+
+fn stored_word(word: &Syllables, level: usize, first_observation: u32) -> [u8; STORED_WORD_BYTES] {
+    let ([a, b], [c, d]) = (word.size.to_le_bytes(), word.turn.to_le_bytes());
+    let [e, f, g, h] = first_observation.to_le_bytes();
+    [word.class as u8, level as u8, a, b, c, d, e, f, g, h]
 }
 
 /// Reads what [`store_words`] wrote onto the end of a site's words; `None`, with nothing added, when it is not that.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::lattice::{Lattice, num_nodes_covered};
+use super::occurrence::ClassSet;
 use super::packed::PackedWord;
 use super::tolerance::{Syllables, WordTolerance, binary_angle};
 use crate::config::ConfigError;
@@ -21,8 +22,11 @@ pub struct WordConstraint {
 
 impl WordConstraint {
     /// Any word.
-    pub const ANY: Self =
-        Self { class: (0, u8::MAX), size: (0, u32::MAX), turn_rad: (-std::f64::consts::PI, std::f64::consts::PI) };
+    pub const ANY: Self = Self {
+        class: (0, u8::MAX),
+        size: (0, u32::MAX),
+        turn_rad: (-std::f64::consts::PI, std::f64::consts::PI),
+    };
 }
 
 /// A set of words: a range of classes, a range of sizes and an arc of turns.
@@ -48,13 +52,26 @@ impl WordBox {
         let is_circle = to_rad - from_rad >= std::f64::consts::TAU - 1e-9;
         let turn_min = binary_angle(from_rad);
         let turn_span = if is_circle { u16::MAX } else { binary_angle(to_rad).wrapping_sub(turn_min) as u16 };
-        Self { class: constraint.class, size: (size(constraint.size.0), size(constraint.size.1)), turn_min, turn_span }
+        Self {
+            class: constraint.class,
+            size: (size(constraint.size.0), size(constraint.size.1)),
+            turn_min,
+            turn_span,
+        }
     }
 
     pub fn contains(&self, word: &PackedWord) -> bool {
         (self.class.0..=self.class.1).contains(&word.class)
             && (self.size.0..=self.size.1).contains(&word.size)
             && word.turn.wrapping_sub(self.turn_min) as u16 <= self.turn_span
+    }
+
+    /// The classes of its words modulo 64, as bits.
+    pub fn classes(&self) -> ClassSet {
+        if self.class.1.saturating_sub(self.class.0) >= 63 {
+            return ClassSet::from(u64::MAX);
+        }
+        (self.class.0..=self.class.1).fold(0, |set, class| set | 1 << (class & 63))
     }
 
     /// Whether a word with this code could be in the box.

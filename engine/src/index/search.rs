@@ -7,9 +7,9 @@
 use std::collections::BTreeMap;
 
 use super::lattice::num_nodes_covered;
-use super::occurrence::OccurrenceIndex;
+use super::occurrence::{ClassSet, OccurrenceIndex, Places};
 use super::packed::PackedWord;
-use super::pattern::{TextQuery, WordBox};
+use super::pattern::{QueryWord, TextQuery, WordBox};
 use crate::text::Interval;
 
 /// A stretch of text that matches a whole question.
@@ -29,6 +29,32 @@ struct Crossing {
     after: usize,
 }
 
+impl Crossing {
+    /// Whether words of the question stand on both sides of the pair.
+    fn is_inside(&self, query: &TextQuery) -> bool {
+        query.words()[self.before].start > 0 && query.words()[self.after].end < query.num_nodes()
+    }
+
+    /// The classes that the words before and behind the pair may have.
+    fn classes_around(&self, query: &TextQuery) -> [ClassSet; 2] {
+        let (start, end) = (query.words()[self.before].start, query.words()[self.after].end);
+        let classes = |is_there: &dyn Fn(&QueryWord) -> bool| {
+            query
+                .words()
+                .iter()
+                .filter(|word| is_there(word))
+                .fold(0, |set, word| set | word.accepts.classes())
+        };
+        let before = if start == 0 { ClassSet::MAX } else { classes(&|word| word.end == start) };
+        let behind =
+            if end == query.num_nodes() { ClassSet::MAX } else { classes(&|word| word.start == end) };
+        [before, behind]
+    }
+}
+
+/// How much dearer a look at the words of a place is than one at the classes in the list.
+const COST_OF_LOOK: usize = 8;
+
 /// Ranks of codes as ascending ranges.
 type RankRanges = Vec<std::ops::Range<u16>>;
 
@@ -42,15 +68,26 @@ impl OccurrenceIndex {
     /// Costs a look at each place of the rarest boundary; asking for single words (`min_words` below 2) scans the text
     /// where one word can answer the whole question.
     pub fn find(&self, query: &TextQuery, min_words: u16) -> Vec<TextMatch> {
+        self.find_at_most(query, min_words, usize::MAX)
+    }
+
+    /// The same, but looks no further once it has found `num_max` stretches or a few more: a question that fits
+    /// nearly everywhere costs no more memory than that.
+    pub fn find_at_most(&self, query: &TextQuery, min_words: u16, num_max: usize) -> Vec<TextMatch> {
         let mut found = Stretches::new();
         let mut reader = Reader::new(self, query);
         for (boundary, mut places) in self.places_to_read(query) {
             places.sort_unstable();
             places.dedup();
-            places.iter().for_each(|&place| reader.read_around(boundary, place as usize, &mut found));
+            for &place in places.iter() {
+                if found.len() >= num_max {
+                    break;
+                }
+                reader.read_around(boundary, place as usize, &mut found);
+            }
         }
         if min_words < 2 {
-            self.find_single_words(query, &mut found);
+            self.find_single_words(query, num_max, &mut found);
         }
         found.retain(|_, num_words| *num_words >= min_words);
         (found.into_iter())
@@ -69,15 +106,19 @@ impl OccurrenceIndex {
             let slices = || self.pair_slices(&ranks[crossing.before], &ranks[crossing.after]);
             *counts.entry(crossing).or_insert_with(|| slices().map(|(_, slice)| slice.len()).sum())
         };
-        let rarest = (1..query.num_nodes()).min_by_key(|&boundary| {
-            crossings(query, boundary).into_iter().map(&mut num_places).sum::<usize>()
-        });
+        // A place costs a glance at the classes around it; where they cannot be told apart, it costs far more.
+        let mut cost = |crossing: Crossing| {
+            num_places(crossing) * if crossing.is_inside(query) { 1 } else { COST_OF_LOOK }
+        };
+        let rarest = (1..query.num_nodes())
+            .min_by_key(|&boundary| crossings(query, boundary).into_iter().map(&mut cost).sum::<usize>());
         let mut places: BTreeMap<usize, Vec<u32>> = BTreeMap::new();
         for crossing in rarest.map(|boundary| crossings(query, boundary)).into_iter().flatten() {
             let there = places.entry(crossing.boundary).or_default();
             let accepts = [crossing.before, crossing.after].map(|word| &query.words()[word].accepts);
+            let classes = crossing.classes_around(query);
             for (is_plain, slice) in self.pair_slices(&ranks[crossing.before], &ranks[crossing.after]) {
-                for &place in slice {
+                for place in slice.within(classes) {
                     // A plain place is that of the word before the boundary.
                     let behind = if is_plain { self.next_node(place as usize) } else { Some(place as usize) };
                     let behind = behind.filter(|&behind| self.is_crossed(behind, accepts));
@@ -103,7 +144,7 @@ impl OccurrenceIndex {
         &'a self,
         before: &'a RankRanges,
         after: &'a RankRanges,
-    ) -> impl Iterator<Item = (bool, &'a [u32])> + 'a {
+    ) -> impl Iterator<Item = (bool, Places<'a>)> + 'a {
         before.iter().cloned().flatten().flat_map(move |first| {
             after.iter().flat_map(move |second| {
                 let plain = self.plain_pairs(first, second.clone());
@@ -147,7 +188,7 @@ impl OccurrenceIndex {
     }
 
     /// Matches by a single word that covers the whole question.
-    fn find_single_words(&self, query: &TextQuery, found: &mut Stretches) {
+    fn find_single_words(&self, query: &TextQuery, num_max: usize, found: &mut Stretches) {
         let is_whole = |start: usize, end: usize| start == 0 && end == query.num_nodes();
         let boxes: Vec<&WordBox> = (query.words().iter())
             .filter(|word| is_whole(word.start, word.end))
@@ -158,6 +199,9 @@ impl OccurrenceIndex {
         }
         let mut node = 0;
         for (position, word) in self.words.iter().enumerate() {
+            if found.len() >= num_max {
+                break;
+            }
             if word.is_node() {
                 node = position;
             }
@@ -226,7 +270,10 @@ impl<'a> Reader<'a> {
         for &(start, words_before) in &self.reached[0] {
             for &(end, words_after) in &self.ends {
                 let num_words = words_before + words_after;
-                found.entry((start, end)).and_modify(|most| *most = num_words.max(*most)).or_insert(num_words);
+                found
+                    .entry((start, end))
+                    .and_modify(|most| *most = num_words.max(*most))
+                    .or_insert(num_words);
             }
         }
     }

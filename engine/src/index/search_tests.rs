@@ -24,7 +24,14 @@ fn random_text(rng: &mut ChaCha8Rng, num_words: usize, max_level: usize) -> Vec<
         let turn_deg = [0.0, 0.0, 20.0, -25.0, 90.0, 175.0, -175.0f32][rng.random_range(0..7usize)];
         let observations = (first, first + size - 1);
         let id = WordId { level: 0, index };
-        words.push(Word { id, class, size, turn_rad: turn_deg.to_radians(), observations, predecessors: vec![] });
+        words.push(Word {
+            id,
+            class,
+            size,
+            turn_rad: turn_deg.to_radians(),
+            observations,
+            predecessors: vec![],
+        });
         first += size;
     }
     for level in 1..=max_level {
@@ -63,7 +70,10 @@ fn scan(texts: &[Vec<Word>], question: &Question, num_nodes: usize, min_words: u
             while let Some(((node, at), num_words)) = states.pop_first() {
                 if node == num_nodes {
                     let interval = Interval { run_idx: run_idx as u32, first, last: at - 1 };
-                    found.entry(interval).and_modify(|most| *most = num_words.max(*most)).or_insert(num_words);
+                    found
+                        .entry(interval)
+                        .and_modify(|most| *most = num_words.max(*most))
+                        .or_insert(num_words);
                     continue;
                 }
                 for (_, end, accepts) in question.iter().filter(|word| word.0 == node) {
@@ -94,7 +104,11 @@ fn question_of<'a>(words: &'a [Word], nodes: std::ops::Range<usize>, is_reversed
             }
             let accepts: Box<dyn Fn(&Word) -> bool> =
                 Box::new(move |other| WordTolerance::default().matches(&read, other));
-            if is_reversed { (nodes.len() - end, nodes.len() - start, accepts) } else { (start, end, accepts) }
+            if is_reversed {
+                (nodes.len() - end, nodes.len() - start, accepts)
+            } else {
+                (start, end, accepts)
+            }
         })
         .collect()
 }
@@ -110,7 +124,7 @@ fn tolerant_questions_find_what_a_scan_finds() {
     let mut rng = ChaCha8Rng::seed_from_u64(11);
     let mut num_found = 0;
     for max_level in [0, 1, 2, 3] {
-        for _ in 0..6 {
+        for _ in 0..16 {
             let (texts, index) = site(&mut rng, max_level);
             for length in 1..=6 {
                 let start = rng.random_range(0..40usize);
@@ -123,7 +137,10 @@ fn tolerant_questions_find_what_a_scan_finds() {
                         let expected = scan(&texts, &question, length, min_words);
                         let found = index.find(&query, min_words);
                         num_found += found.len();
-                        assert_eq!(found, expected, "{length} words, level {max_level}, reversed {is_reversed}");
+                        assert_eq!(
+                            found, expected,
+                            "{length} words, level {max_level}, reversed {is_reversed}"
+                        );
                     }
                 }
             }
@@ -139,7 +156,8 @@ fn exact_questions_find_what_a_scan_finds() {
         let (texts, index) = site(&mut rng, max_level);
         for (run_idx, length) in [(0, 1), (0, 2), (0, 3), (3, 4), (4, 12)] {
             let level0 = |run: usize| texts[run].iter().filter(|word| word.id.level == 0).collect::<Vec<_>>();
-            let asked: Vec<Syllables> = level0(run_idx)[7..7 + length].iter().map(|word| Syllables::of(word)).collect();
+            let asked: Vec<Syllables> =
+                level0(run_idx)[7..7 + length].iter().map(|word| Syllables::of(word)).collect();
             let mut expected = Vec::new();
             for run in 0..texts.len() {
                 for words in level0(run).windows(length) {
@@ -161,7 +179,7 @@ fn exact_questions_find_what_a_scan_finds() {
 fn patterns_find_what_a_scan_finds() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let mut num_found = 0;
-    for _ in 0..10 {
+    for _ in 0..40 {
         let (texts, index) = site(&mut rng, 2);
         let turns_deg = [(-180.0, 180.0), (-20.0, 20.0), (60.0, 120.0), (170.0, 190.0)];
         let pattern: Vec<WordConstraint> = (0..rng.random_range(1..5))
@@ -190,6 +208,50 @@ fn patterns_find_what_a_scan_finds() {
         assert_eq!(found, scan(&texts, &question, pattern.len(), 1), "{pattern:?}");
     }
     assert!(num_found > 100, "{num_found} matches test little");
+}
+
+#[test]
+fn what_was_found_is_read_word_by_word() {
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    // More words than a block of the table of level-0 words.
+    let texts = [random_text(&mut rng, 700, 2), random_text(&mut rng, 300, 2)];
+    let lattices = texts.clone().map(|text| Lattice::from_words(&text).unwrap());
+    let index = OccurrenceIndex::build(&lattices);
+    for (run_idx, (text, lattice)) in texts.iter().zip(&lattices).enumerate() {
+        assert_eq!(index.stored_run(run_idx), store_words(lattice));
+        let level0: Vec<&Word> = text.iter().filter(|word| word.id.level == 0).collect();
+        for first_node in [0, 1, 17, 250] {
+            let nodes = &level0[first_node..first_node + 9];
+            let (first, last) = (nodes[0].observations.0, nodes[8].observations.1);
+            let reading = index.read(&Interval { run_idx: run_idx as u32, first, last }).unwrap();
+            assert_eq!((reading.first_node as usize, reading.num_nodes), (first_node, 9));
+            let inside: Vec<&Word> = text
+                .iter()
+                .filter(|word| word.observations.0 >= first && word.observations.1 <= last)
+                .collect();
+            assert_eq!(reading.words.len(), inside.len());
+            for word in &reading.words {
+                let observations = (nodes[word.start].observations.0, nodes[word.end - 1].observations.1);
+                let same = inside.iter().find(|other| other.observations == observations).unwrap();
+                assert_eq!(word.syllables, Syllables::of(same));
+            }
+        }
+    }
+    assert!(index.read(&Interval { run_idx: 2, first: 0, last: 1 }).is_none());
+    assert!(index.stored_run(2).is_empty());
+}
+
+#[test]
+fn a_question_that_fits_everywhere_stops_early() {
+    let mut rng = ChaCha8Rng::seed_from_u64(15);
+    let (_, index) = site(&mut rng, 2);
+    for length in [1, 2] {
+        let query = TextQuery::from_pattern(&vec![WordConstraint::ANY; length]).unwrap();
+        let all = index.find(&query, 1);
+        let some = index.find_at_most(&query, 1, 10);
+        assert!((10..25).contains(&some.len()) && all.len() > 100);
+        assert!(some.iter().all(|found| all.contains(found)));
+    }
 }
 
 #[test]

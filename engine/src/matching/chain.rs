@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::MatchingConfig;
 use super::rows::{Comparison, Rows};
-use crate::index::{Lattice, num_nodes_covered};
+use crate::index::{Lattice, WordWindow, num_nodes_covered};
 use crate::text::{Direction, WordId};
 
 /// A maximal n-gram match: words of two texts that match pair by pair along predecessor links (Eq 5.2).
@@ -90,15 +90,19 @@ impl ChainFinder {
     /// Alternative words that end at a node become known with the node after it, so the newest row is filled again.
     pub fn extend(&mut self, earlier: &Lattice, later: &Lattice) {
         for pass in &mut self.passes {
-            let texts = comparison(&self.config, self.relation, pass.direction, earlier, later);
             pass.rows.grow_columns(earlier.num_nodes());
             pass.rows.pop();
             while pass.ends.last().is_some_and(|end| end.later_node >= pass.rows.next_node()) {
                 pass.ends.pop();
             }
-            while pass.rows.next_node() < later.num_nodes() {
-                pass.rows.push(&texts);
-                pass.collect_ends();
+        }
+        // All passes of a direction have come equally far and compare with the same words.
+        let max_level = self.config.min_chain_words.len().saturating_sub(1);
+        for passes in self.passes.chunk_by_mut(|a, b| a.direction == b.direction) {
+            let texts = comparison(&self.config, self.relation, passes[0].direction, earlier, later);
+            for node in passes[0].rows.next_node()..later.num_nodes() {
+                let windows = texts.windows(node, max_level);
+                passes.iter_mut().for_each(|pass| pass.extend(&texts, &windows));
             }
         }
     }
@@ -122,19 +126,15 @@ impl ChainFinder {
 }
 
 impl Pass {
-    fn collect_ends(&mut self) {
-        let later_node = self.rows.next_node() - 1;
-        let Some(row) = self.rows.row(later_node) else { return };
-        // Long chains are rare: whole blocks are dismissed by their maximum, which is vector code.
-        for (block_idx, block) in row.chunks(64).enumerate() {
-            if block.iter().fold(0, |most, &length| most.max(length)) < self.min_words {
-                continue;
-            }
-            for (offset, &num_words) in block.iter().enumerate() {
-                if num_words >= self.min_words {
-                    let earlier_column = block_idx * 64 + offset;
-                    self.ends.push(ChainEnd { later_node, earlier_column, num_words });
-                }
+    /// Fills the next row and remembers where long chains end in it.
+    fn extend(&mut self, texts: &Comparison, windows: &[Option<WordWindow>]) {
+        let later_node = self.rows.next_node();
+        if self.rows.push(texts, windows) < self.min_words {
+            return;
+        }
+        for (earlier_column, &num_words) in self.rows.row(later_node).unwrap_or_default().iter().enumerate() {
+            if num_words >= self.min_words {
+                self.ends.push(ChainEnd { later_node, earlier_column, num_words });
             }
         }
     }
@@ -219,7 +219,8 @@ fn rows_around(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Block {
         let first_column = columns.start;
         let mut rows = Rows::new(max_level, first_node, columns, reach + 1);
         while rows.next_node() <= end.later_node {
-            rows.push(texts);
+            let windows = texts.windows(rows.next_node(), max_level);
+            rows.push(texts, &windows);
         }
         let block = Block { rows, first_column, max_level };
         let is_whole = reach >= texts.later.num_nodes().max(texts.earlier.num_nodes());

@@ -45,7 +45,8 @@ impl TextStatistics {
     /// Counts the words of a site's texts, for chains through words of levels 0 to `max_level`.
     pub fn new(texts: &[Lattice], max_level: usize, tolerance: WordTolerance) -> Self {
         let table = |max_level| {
-            [Direction::Same, Direction::Opposite].map(|direction| WordCounts::new(texts, max_level, direction))
+            [Direction::Same, Direction::Opposite]
+                .map(|direction| WordCounts::new(texts, max_level, direction))
         };
         Self { tolerance, tables: (0..=max_level).map(table).collect() }
     }
@@ -125,11 +126,11 @@ impl WordCounts {
         let after = &after[..after.partition_point(|entry| entry.0 == class)];
         let sum = |entries: &[(u16, Syllables, u32)]| entries.iter().map(|entry| u64::from(entry.2)).sum();
         let size_max = window.size_min.saturating_add(window.size_span);
-        let from = after.partition_point(|entry| (entry.1.class, entry.1.size) < (window.class, window.size_min));
+        let from =
+            after.partition_point(|entry| (entry.1.class, entry.1.size) < (window.class, window.size_min));
         let to = after.partition_point(|entry| (entry.1.class, entry.1.size) <= (window.class, size_max));
         let is_match = |entry: &&(u16, Syllables, u32)| window.contains(&entry.1);
-        let num_matching =
-            after[from..to].iter().filter(is_match).map(|entry| u64::from(entry.2)).sum();
+        let num_matching = after[from..to].iter().filter(is_match).map(|entry| u64::from(entry.2)).sum();
         (num_matching, sum(after))
     }
 }
@@ -183,13 +184,19 @@ mod tests {
             let mut num_found = 0.0f64;
             for later in 0..texts.len() {
                 for earlier in (0..texts.len()).filter(|&earlier| earlier != later) {
-                    let chains = find_chains(&texts[earlier], &texts[later], Relation::DifferentRuns, &config);
-                    let evidence = chains.iter().filter_map(|chain| statistics.evidence(chain, &texts[later]));
-                    num_found += evidence.filter(|evidence| evidence.expected_chance_matches < 1.0).count() as f64;
+                    let chains =
+                        find_chains(&texts[earlier], &texts[later], Relation::DifferentRuns, &config);
+                    let evidence =
+                        chains.iter().filter_map(|chain| statistics.evidence(chain, &texts[later]));
+                    num_found +=
+                        evidence.filter(|evidence| evidence.expected_chance_matches < 1.0).count() as f64;
                 }
             }
             // Two directions for each of six texts.
-            assert!(num_found < 2.0 * 6.0 * 5.0, "{num_found} chains below an E-value of 1 at level {max_level}");
+            assert!(
+                num_found < 2.0 * 6.0 * 5.0,
+                "{num_found} chains below an E-value of 1 at level {max_level}"
+            );
         }
     }
 }

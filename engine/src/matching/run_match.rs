@@ -81,6 +81,8 @@ mod tests {
         assert_eq!((whole.earlier.run_idx, whole.chain.direction), (1, Direction::Same));
         assert_eq!((whole.earlier.first, whole.earlier.last), (whole.later.first, whole.later.last));
         assert!(whole.evidence.expected_chance_matches < 1e-9);
-        assert!(matches.iter().all(|found| found.evidence.expected_chance_matches <= config.max_chance_matches));
+        assert!(
+            matches.iter().all(|found| found.evidence.expected_chance_matches <= config.max_chance_matches)
+        );
     }
 }
