@@ -88,7 +88,7 @@ fn build(name: &str, text: &SyntheticText, max_level: usize) -> OccurrenceIndex 
     for _ in 0..3 {
         let start = cpu_seconds();
         index = OccurrenceIndex::from_stored([stored.as_slice()]).unwrap();
-        seconds.push((cpu_seconds() - start));
+        seconds.push(cpu_seconds() - start);
     }
     let (median, _) = percentiles(&mut seconds);
     println!(
