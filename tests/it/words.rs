@@ -42,7 +42,10 @@ async fn words_are_found_as_soon_as_they_are_written() {
     let text = api.all("/v1/sites/a/runs/s/words").await;
     let last = text.len() - 1;
     let before = ask(api, IN_SITE, &text[last - 2..]).await;
-    assert!(is_there(&before, "s", [last - 2, last]), "the last word comes with the end of the run: {before}");
+    assert!(
+        is_there(&before, "s", [last - 2, last]),
+        "the last word comes with the end of the run: {before}"
+    );
     let anything = vec![json!({}); 3];
     let runs_before = ask(api, IN_SITE, &anything).await;
     let server = server.restart().await;

@@ -75,6 +75,12 @@ impl WordColumns {
         (&self.class[range.clone()], &self.size[range.clone()], &self.turn[range])
     }
 
+    fn append(&mut self, other: &Self) {
+        self.class.extend_from_slice(&other.class);
+        self.size.extend_from_slice(&other.size);
+        self.turn.extend_from_slice(&other.turn);
+    }
+
     fn push(&mut self, word: Syllables) {
         self.class.push(word.class);
         self.size.push(word.size);
@@ -86,6 +92,16 @@ impl LevelColumns {
     fn push_absent(&mut self) {
         self.by_node.push(Syllables { class: ABSENT, size: 0, turn: 0 });
         self.index.push(u32::MAX);
+    }
+
+    fn append(&mut self, other: &Self, first_node: usize) {
+        let first_word = self.ends.len() as u32;
+        self.by_node.append(&other.by_node);
+        self.in_row.append(&other.in_row);
+        self.ends.extend(other.ends.iter().map(|end| end + first_node as u32));
+        // The mark of a node without a word stays as it is.
+        let renumbered = |&index: &u32| if index == u32::MAX { index } else { index + first_word };
+        self.index.extend(other.index.iter().map(renumbered));
     }
 
     fn set(&mut self, node: usize, word: &Word) {
@@ -115,6 +131,36 @@ impl Lattice {
         let mut lattice = Self::default();
         lattice.extend(words)?;
         Ok(lattice)
+    }
+
+    /// Several texts one after the other, with a node at which no word ends between any two, so that no chain leads from
+    /// one to the next. Words and observations are numbered anew.
+    pub fn joined(texts: &[&Self]) -> Self {
+        let mut joined = Self::default();
+        let num_levels = texts.iter().map(|text| text.num_levels()).max().unwrap_or(0);
+        joined.levels.resize_with(num_levels, LevelColumns::default);
+        for text in texts {
+            if !joined.observations.is_empty() {
+                let last = joined.last_observation();
+                joined.observations.push((last, last));
+                joined.levels.iter_mut().for_each(LevelColumns::push_absent);
+            }
+            let (first_node, offset) = (joined.num_nodes(), joined.last_observation());
+            joined
+                .observations
+                .extend(text.observations.iter().map(|span| (span.0 + offset, span.1 + offset)));
+            for (level, columns) in joined.levels.iter_mut().enumerate() {
+                match text.levels.get(level) {
+                    Some(other) => columns.append(other, first_node),
+                    None => (0..text.num_nodes()).for_each(|_| columns.push_absent()),
+                }
+            }
+        }
+        joined
+    }
+
+    fn last_observation(&self) -> u32 {
+        self.observations.last().map_or(0, |span| span.1)
     }
 
     /// Adds words at the end of the text: level-0 words that follow the last one and the alternatives among them.

@@ -71,6 +71,36 @@ pub fn find_chains(
     finder.chains(earlier, later)
 }
 
+/// All maximal chains between each of several texts of other runs and a later one, with the number of the text:
+/// what [`find_chains`] finds one by one. Short texts are compared as one long text, which costs far less.
+pub fn find_chains_in(texts: &[&Lattice], later: &Lattice, config: &MatchingConfig) -> Vec<(usize, Chain)> {
+    let joined = Lattice::joined(texts);
+    // Where each text begins; empty texts have a node of their own to stand behind.
+    let mut starts = Vec::with_capacity(texts.len());
+    let mut next = 0;
+    for text in texts {
+        let start = if next == 0 { 0 } else { next + 1 };
+        starts.push(start);
+        next = start + text.num_nodes();
+    }
+    let in_text = |id: WordId| {
+        let end = joined.end_of(id)?;
+        let text = starts.partition_point(|&start| start <= end).checked_sub(1)?;
+        Some((text, texts[text].id_ending_at(end - starts[text], usize::from(id.level))?))
+    };
+    let mut chains = Vec::new();
+    for mut chain in find_chains(&joined, later, Relation::DifferentRuns, config) {
+        let mut text_idx = None;
+        for (earlier, _) in &mut chain.pairs {
+            let Some((text, id)) = in_text(*earlier) else { continue };
+            (text_idx, *earlier) = (Some(text), id);
+        }
+        chains.extend(text_idx.map(|text| (text, chain)));
+    }
+    chains.sort_by_key(|found| found.0);
+    chains
+}
+
 impl ChainFinder {
     /// Nothing compared yet.
     pub fn new(relation: Relation, config: MatchingConfig) -> Self {

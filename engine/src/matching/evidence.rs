@@ -61,13 +61,18 @@ impl TextStatistics {
             bits -= counts.share(before, &self.tolerance.window(&word)).log2();
             before = Some(word.class);
         }
-        let max_level = usize::from(chain.max_level);
-        let num_later = (0..=max_level).map(|level| count_words(later, level)).sum::<u64>() as f64;
         // Each step back may take any of the words that end there, on both sides.
         let choices = counts.num_words as f64 / counts.num_nodes.max(1) as f64;
         let steps = chain.pairs.len().checked_sub(1)? as f64;
-        let log2_paths = num_later.log2() + (counts.num_words as f64).log2() + 2.0 * steps * choices.log2();
+        let log2_paths =
+            counts.log2_pairs(later, usize::from(chain.max_level)) + 2.0 * steps * choices.log2();
         Some(ChainEvidence { bits, expected_chance_matches: (log2_paths - bits).exp2() })
+    }
+
+    /// The worth of a pair of places at which no words match: chance brings as many as there are pairs of words.
+    pub fn evidence_of_nothing(&self, later: &Lattice) -> ChainEvidence {
+        let num_pairs = self.tables.first().map_or(0.0, |tables| tables[0].log2_pairs(later, 0).exp2());
+        ChainEvidence { bits: 0.0, expected_chance_matches: num_pairs }
     }
 }
 
@@ -99,6 +104,12 @@ impl WordCounts {
             }
         }
         Self { entries, num_words, num_nodes }
+    }
+
+    /// log2 of the number of pairs of a word of these texts and one of `later`, of levels up to `max_level`.
+    fn log2_pairs(&self, later: &Lattice, max_level: usize) -> f64 {
+        let num_later = (0..=max_level).map(|level| count_words(later, level)).sum::<u64>() as f64;
+        num_later.max(1.0).log2() + (self.num_words as f64).max(1.0).log2()
     }
 
     /// The share of words that match, among those after a class or among all; half a word more, so that it is never 0.
@@ -140,7 +151,7 @@ fn word_of(text: &Lattice, id: WordId) -> Option<Syllables> {
 }
 
 fn count_words(text: &Lattice, level: usize) -> u64 {
-    (0..text.num_nodes()).filter(|&node| text.word_ending_at(node, level).is_some()).count() as u64
+    text.level(level).map_or(0, |columns| columns.ends.len() as u64)
 }
 
 #[cfg(test)]

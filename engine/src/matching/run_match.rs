@@ -1,6 +1,6 @@
 //! One run's text against all texts of a site: what the map builder asks of this room.
 
-use super::chain::{Chain, Relation, find_chains};
+use super::chain::{Chain, Relation, find_chains, find_chains_in};
 use super::claim::chain_stretches;
 use super::config::MatchingConfig;
 use super::evidence::{ChainEvidence, TextStatistics};
@@ -34,26 +34,28 @@ pub fn match_run(
         ..config.clone()
     };
     let mut matches = Vec::new();
-    for (earlier_run, earlier) in texts.iter().enumerate().take(later_run + 1) {
-        let relation = if earlier_run == later_run { Relation::SameRun } else { Relation::DifferentRuns };
-        for chain in find_chains(earlier, later, relation, &any_length) {
-            let Some(evidence) = statistics.evidence(&chain, later) else { continue };
-            if evidence.expected_chance_matches > config.max_chance_matches {
-                continue;
-            }
-            let Some([earlier_span, later_span]) = chain_stretches(&chain, earlier, later) else { continue };
-            let interval = |run_idx: usize, span: (u32, u32)| Interval {
-                run_idx: run_idx as u32,
-                first: span.0,
-                last: span.1,
-            };
-            matches.push(RunMatch {
-                earlier: interval(earlier_run, earlier_span),
-                later: interval(later_run, later_span),
-                chain,
-                evidence,
-            });
+    let others: Vec<&Lattice> = texts[..later_run].iter().collect();
+    let with_itself = find_chains(later, later, Relation::SameRun, &any_length);
+    let chains = (find_chains_in(&others, later, &any_length).into_iter())
+        .chain(with_itself.into_iter().map(|chain| (later_run, chain)));
+    for (earlier_run, chain) in chains {
+        let earlier = &texts[earlier_run];
+        let Some(evidence) = statistics.evidence(&chain, later) else { continue };
+        if evidence.expected_chance_matches > config.max_chance_matches {
+            continue;
         }
+        let Some([earlier_span, later_span]) = chain_stretches(&chain, earlier, later) else { continue };
+        let interval = |run_idx: usize, span: (u32, u32)| Interval {
+            run_idx: run_idx as u32,
+            first: span.0,
+            last: span.1,
+        };
+        matches.push(RunMatch {
+            earlier: interval(earlier_run, earlier_span),
+            later: interval(later_run, later_span),
+            chain,
+            evidence,
+        });
     }
     matches
 }
