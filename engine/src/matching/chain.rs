@@ -142,12 +142,19 @@ impl ChainFinder {
     pub fn chains(&self, earlier: &Lattice, later: &Lattice) -> Vec<Chain> {
         let mut chains: Vec<Chain> = Vec::new();
         let mut known = BTreeSet::new();
-        for pass in &self.passes {
-            let texts = comparison(&self.config, self.relation, pass.direction, earlier, later);
-            let ends = pass.ends.iter().filter(|end| !continues(&texts, pass.max_level, end));
-            for chain in ends.map(|end| trace(&texts, pass.max_level, end)) {
-                if known.insert((chain.direction, chain.pairs.clone())) {
-                    chains.push(chain);
+        let max_level = self.config.min_chain_words.len().saturating_sub(1);
+        for passes in self.passes.chunk_by(|a, b| a.direction == b.direction) {
+            if passes.iter().all(|pass| pass.ends.is_empty()) {
+                continue;
+            }
+            let texts = comparison(&self.config, self.relation, passes[0].direction, earlier, later);
+            let windows: Vec<_> = (0..later.num_nodes()).map(|node| texts.windows(node, max_level)).collect();
+            for pass in passes {
+                let ends = pass.ends.iter().filter(|end| !continues(&texts, pass.max_level, end));
+                for chain in ends.map(|end| trace(&texts, &windows, pass.max_level, end)) {
+                    if known.insert((chain.direction, chain.pairs.clone())) {
+                        chains.push(chain);
+                    }
                 }
             }
         }
@@ -205,8 +212,8 @@ fn is_match(
 }
 
 /// Reads off the longest chain that ends at a pair of nodes, preferring lower levels where chains are equally long.
-fn trace(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Chain {
-    let block = rows_around(texts, max_level, end);
+fn trace(texts: &Comparison, windows: &[Vec<Option<WordWindow>>], max_level: usize, end: &ChainEnd) -> Chain {
+    let block = rows_around(texts, windows, max_level, end);
     let mut pairs = Vec::with_capacity(end.num_words as usize);
     let (mut node, mut column, mut remaining) = (end.later_node, end.earlier_column, end.num_words);
     while remaining > 0 {
@@ -236,7 +243,12 @@ struct Block {
 }
 
 /// Fills rows again around the end of a chain, in a window that grows until it holds a chain of the known length.
-fn rows_around(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Block {
+fn rows_around(
+    texts: &Comparison,
+    windows: &[Vec<Option<WordWindow>>],
+    max_level: usize,
+    end: &ChainEnd,
+) -> Block {
     let mut reach = end.num_words as usize + num_nodes_covered(max_level);
     loop {
         let first_node = end.later_node.saturating_sub(reach);
@@ -249,8 +261,7 @@ fn rows_around(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Block {
         let first_column = columns.start;
         let mut rows = Rows::new(max_level, first_node, columns, reach + 1);
         while rows.next_node() <= end.later_node {
-            let windows = texts.windows(rows.next_node(), max_level);
-            rows.push(texts, &windows);
+            rows.push(texts, &windows[rows.next_node()]);
         }
         let block = Block { rows, first_column, max_level };
         let is_whole = reach >= texts.later.num_nodes().max(texts.earlier.num_nodes());
