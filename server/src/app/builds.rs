@@ -9,7 +9,6 @@ use locution_engine::mapping::{
     Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
     SiteMap, map_site,
 };
-use locution_engine::semantics::SemanticsConfig;
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
@@ -158,7 +157,7 @@ async fn map_runs(
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
         let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
             keep_vetoed_visible(&mut map, &decisions);
-            let labels = label_map(&records, &map, &SemanticsConfig::default());
+            let labels = label_map(&records, &map, &config.semantics);
             (map, labels)
         });
         (memo, outcome)
