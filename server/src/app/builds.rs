@@ -9,7 +9,6 @@ use locution_engine::mapping::{
     Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
     SiteMap, map_site, weigh_texts,
 };
-use locution_engine::semantics::SemanticsConfig;
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
@@ -159,7 +158,7 @@ async fn map_runs(
         let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
             weigh_texts(&records, &mut map, &config.matching);
             keep_vetoed_visible(&mut map, &decisions);
-            let labels = label_map(&records, &map, &SemanticsConfig::default());
+            let labels = label_map(&records, &map, &config.semantics);
             (map, labels)
         });
         (memo, outcome)
