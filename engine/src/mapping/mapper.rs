@@ -11,8 +11,9 @@ use super::guided::guided_closures;
 use super::joining::{Hypothesis, hypotheses, judge_join, registered_candidates};
 use super::judgements::Judgements;
 use super::memo::RegistrationMemo;
-use super::place_match::Decision;
+use super::place_match::{Decision, PlaceMatch};
 use super::placement::place_observations;
+use super::refused::refused_matches;
 use super::run::RunRecord;
 use super::site_map::{MappedRun, SiteMap};
 use super::stretches::{StretchSettings, find_stretches};
@@ -53,6 +54,7 @@ struct Mapper<'a> {
     graph: CoarseGraph,
     closures: Vec<Closure>,
     tried: Vec<(usize, usize)>,
+    refused: Vec<PlaceMatch>,
 }
 
 impl<'a> Mapper<'a> {
@@ -65,7 +67,8 @@ impl<'a> Mapper<'a> {
         let mut graph = CoarseGraph::new(set, runs, config);
         graph.optimise(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
-        Ok(Self { config, runs, set, judgements, components, graph, closures: Vec::new(), tried: Vec::new() })
+        let (closures, tried, refused) = (Vec::new(), Vec::new(), Vec::new());
+        Ok(Self { config, runs, set, judgements, components, graph, closures, tried, refused })
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
@@ -106,8 +109,9 @@ impl<'a> Mapper<'a> {
                     && !self.judgements.forbid(candidate.earlier, candidate.later)
             })
             .collect();
-        let registered: Vec<Closure> =
-            registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
+        let registered = registered_candidates(&across, self.set, self.config, memo);
+        self.refused = refused_matches(&across, &registered);
+        let registered: Vec<Closure> = registered.into_iter().flatten().collect();
         let mut refused: BTreeSet<(u32, u32)> = BTreeSet::new();
         loop {
             let proposals = hypotheses(&registered, self.set, &self.graph, &self.components, self.config);
@@ -189,7 +193,7 @@ impl<'a> Mapper<'a> {
             })
             .collect();
         let num_components = components.iter().max().map_or(0, |last| last + 1);
-        SiteMap { matches, runs, num_components }
+        SiteMap { matches, refused: self.refused, runs, num_components }
     }
 }
 

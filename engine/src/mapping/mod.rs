@@ -14,6 +14,7 @@ mod memo;
 mod occupancy;
 mod place_match;
 mod placement;
+mod refused;
 mod run;
 mod site_map;
 mod stretches;

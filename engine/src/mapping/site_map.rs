@@ -18,6 +18,8 @@ pub struct MappedRun {
 pub struct SiteMap {
     /// Claims of places driven twice, best first by nothing: in a fixed order.
     pub matches: Vec<PlaceMatch>,
+    /// Candidates between runs that registration refused, best first; a bounded number of them.
+    pub refused: Vec<PlaceMatch>,
     /// Runs in the order they were given.
     pub runs: Vec<MappedRun>,
     /// Number of components.
