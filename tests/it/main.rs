@@ -7,3 +7,4 @@ mod batches;
 mod crash;
 mod maps;
 mod sites;
+mod words;
