@@ -34,6 +34,11 @@ pub(super) fn count<const W: usize>(a: &Row<W>) -> u32 {
     a.iter().map(|word| word.count_ones()).sum()
 }
 
+/// The same, quicker where there are rarely any.
+pub(super) fn count_few<const W: usize>(a: &Row<W>) -> u32 {
+    if is_empty(a) { 0 } else { count(a) }
+}
+
 /// True when a bit is set.
 pub(super) fn has<const W: usize>(a: &Row<W>, bit: usize) -> bool {
     a[bit / 64] >> (bit % 64) & 1 == 1

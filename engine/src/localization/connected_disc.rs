@@ -17,8 +17,8 @@
 
 use super::arc_planes::{ArcPlanes, DiscShape};
 use super::bit_window::{
-    BitPlanes, Row, and, and_not, count, has, is_empty, or, set_bits, shifted_left, shifted_right, span,
-    spread,
+    BitPlanes, Row, and, and_not, count, count_few, has, is_empty, or, set_bits, shifted_left, shifted_right,
+    span, spread,
 };
 use super::kernel_rows::KernelRows;
 
@@ -107,7 +107,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             return false;
         }
         self.num_reached -= count(&leaving);
-        self.num_open -= count(&and(&leaving, &self.arcs.leaving_open[arc - 1]));
+        self.num_open -= count_few(&and(&leaving, &self.arcs.leaving_open[arc - 1]));
         self.enter(arc);
         true
     }
@@ -204,7 +204,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         }
         self.reach[arc] = joined;
         self.num_reached += count(&joined);
-        self.num_open += count(&and(&joined, &self.arcs.entering_open[arc]));
+        self.num_open += count_few(&and(&joined, &self.arcs.entering_open[arc]));
         let missed_left = and_not(&self.arcs.entering_free[arc - 1], &on_left);
         let missed = or(&missed_left, &and_not(&free_inside, &reached_inside));
         for row in set_bits(&and(&joined, &missed)) {

@@ -32,8 +32,12 @@ pub(super) const STABLE: u8 = 0x80;
 /// Most kernels a field can hold.
 pub const MAX_KERNELS: usize = 4;
 
+/// Code of a cell that is not free.
+const EMPTY: u16 = u16::from_le_bytes([NOT_FREE, 0]);
+
 const TILE_SIDE: usize = 8;
-const NO_TILE: u32 = u32::MAX;
+/// The first tile is empty and stands for all squares without a free cell.
+const NO_TILE: u32 = 0;
 
 /// How density fields are made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -128,8 +132,9 @@ impl DensityField {
             num_kernels: layers.len(),
             stride,
             tiles_per_row,
-            tiles: vec![NO_TILE; tiles_per_row * height.div_ceil(TILE_SIDE)],
-            codes: Vec::new(),
+            // One more square than the map has stands for everywhere else.
+            tiles: vec![NO_TILE; tiles_per_row * height.div_ceil(TILE_SIDE) + 1],
+            codes: vec![EMPTY; TILE_SIDE * TILE_SIDE * stride],
         };
         for (cell, state) in map.cells().iter().enumerate() {
             if *state != CellState::Free {
@@ -150,7 +155,7 @@ impl DensityField {
         let slot = &mut self.tiles[row / TILE_SIDE * self.tiles_per_row + column / TILE_SIDE];
         if *slot == NO_TILE {
             *slot = (self.codes.len() / tile_len) as u32;
-            self.codes.resize(self.codes.len() + tile_len, u16::from_le_bytes([NOT_FREE, 0]));
+            self.codes.resize(self.codes.len() + tile_len, EMPTY);
         }
         *slot as usize * tile_len
     }
@@ -191,18 +196,43 @@ impl DensityField {
         if !is_inside || kernel >= self.num_kernels {
             return None;
         }
-        decode(self.codes_at(column as usize, row as usize)?[kernel])
+        let (column, row) = (column as usize, row as usize);
+        let square = row / TILE_SIDE * self.tiles_per_row + column / TILE_SIDE;
+        decode(self.codes[self.start(square, place_in_tile(column, row)) + kernel])
     }
 
-    /// The codes of a cell inside the map, `stride` of them; None when its tile does not exist.
+    /// First code of a cell, by its square and its place there.
     #[inline]
-    pub(super) fn codes_at(&self, column: usize, row: usize) -> Option<&[u16]> {
-        let tile = self.tiles[row / TILE_SIDE * self.tiles_per_row + column / TILE_SIDE];
-        if tile == NO_TILE {
-            return None;
+    fn start(&self, square: usize, place: usize) -> usize {
+        (self.tiles[square] as usize * TILE_SIDE * TILE_SIDE + place) * self.stride
+    }
+
+    /// Where the codes of the cells at some positions begin, in metres from the lower left corner; outside the map
+    /// that is an empty cell. Without branches, as particles are anywhere.
+    #[inline]
+    pub(super) fn starts<const L: usize>(&self, x_m: &[f32; L], y_m: &[f32; L]) -> [usize; L] {
+        const SIDE: u32 = TILE_SIDE as u32;
+        let scale = (1.0 / self.resolution_m) as f32;
+        let (width, height) = (self.width as f32, self.height as f32);
+        let (outside, tiles_per_row) = ((self.tiles.len() - 1) as u32, self.tiles_per_row as u32);
+        let mut squares = [0u32; L];
+        let mut places = [0u32; L];
+        for (((square, place), x_m), y_m) in squares.iter_mut().zip(&mut places).zip(x_m).zip(y_m) {
+            let (x, y) = (x_m * scale, y_m * scale);
+            let is_inside = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height);
+            let (column, row) = (x as i32 as u32, y as i32 as u32);
+            let (across, up) = (column / SIDE, row / SIDE);
+            *square = if is_inside { up.wrapping_mul(tiles_per_row).wrapping_add(across) } else { outside };
+            *place = row % SIDE * SIDE + column % SIDE;
         }
-        let start = (tile as usize * TILE_SIDE * TILE_SIDE + place_in_tile(column, row)) * self.stride;
-        Some(&self.codes[start..start + self.stride])
+        std::array::from_fn(|lane| self.start(squares[lane] as usize, places[lane] as usize))
+    }
+
+    /// The codes of a cell, from where they begin.
+    #[inline]
+    pub(super) fn codes_from<const STRIDE: usize>(&self, start: usize) -> [u16; STRIDE] {
+        let codes = &self.codes[start..start + STRIDE];
+        std::array::from_fn(|kernel| codes[kernel])
     }
 
     /// Kernels laid out per cell: 1, 2 or 4.

@@ -47,45 +47,73 @@ impl GradientConfig {
 /// `densities` are rows of `width` cells, NaN where there is no density. The Sobel operator needs the eight
 /// neighbours, and stability the gradients of those, so a direction exists only where 5 × 5 cells have a density.
 pub(super) fn stable_descent(densities: &[f32], width: usize, config: &GradientConfig) -> Vec<Option<f32>> {
-    let slopes: Vec<Slope> =
-        (0..densities.len()).into_par_iter().map(|cell| sobel(densities, width, cell)).collect();
+    let slopes = Slopes::of(densities, width);
     let height = densities.len() / width;
     let min_steepness = config.min_slope_per_cell as f32;
     let min_cosine = config.max_turn_rad.cos() as f32;
     let descent_at = |cell: usize| {
-        let (column, row) = (cell % width, cell / width);
-        let own = slopes[cell];
-        let is_inner = column > 0 && row > 0 && column + 1 < width && row + 1 < height;
-        if !is_inner || own.steepness <= min_steepness || own.steepness.is_nan() {
+        let steepness = slopes.steepness[cell];
+        if steepness <= min_steepness || steepness.is_nan() {
             return None;
         }
-        let is_stable = neighbours(cell, width).iter().all(|&other| {
-            let [ox, oy] = slopes[other].uphill;
-            own.uphill[0] * ox + own.uphill[1] * oy >= min_cosine
-        });
-        is_stable.then(|| descent(own.uphill[0], own.uphill[1]))
+        let (column, row) = (cell % width, cell / width);
+        let is_inner = column > 0 && row > 0 && column + 1 < width && row + 1 < height;
+        let (x, y) = (slopes.uphill_x[cell], slopes.uphill_y[cell]);
+        let is_stable = is_inner
+            && neighbours(cell, width)
+                .iter()
+                .all(|&other| x * slopes.uphill_x[other] + y * slopes.uphill_y[other] >= min_cosine);
+        is_stable.then(|| descent(x, y))
     };
     (0..densities.len()).into_par_iter().map(descent_at).collect()
 }
 
-/// A gradient: its direction as a unit vector and its length per cell; NaN where a neighbour has no density.
-#[derive(Clone, Copy)]
-struct Slope {
-    uphill: [f32; 2],
-    steepness: f32,
+/// Gradients of all cells: their directions as unit vectors and their lengths per cell; NaN where a neighbour has no
+/// density and at the map's edge.
+struct Slopes {
+    uphill_x: Vec<f32>,
+    uphill_y: Vec<f32>,
+    steepness: Vec<f32>,
 }
 
-/// The Sobel gradient of footnote 3 in section 3.3.1, rows growing upwards.
-fn sobel(densities: &[f32], width: usize, cell: usize) -> Slope {
-    let (column, row) = (cell % width, cell / width);
-    if column == 0 || row == 0 || column + 1 == width || (row + 1) * width == densities.len() {
-        return Slope { uphill: [f32::NAN; 2], steepness: f32::NAN };
+impl Slopes {
+    /// The Sobel gradient of footnote 3 in section 3.3.1, rows growing upwards; row by row, so that several cells are
+    /// computed at once.
+    fn of(densities: &[f32], width: usize) -> Self {
+        let unknown = || vec![f32::NAN; densities.len()];
+        let mut slopes = Self { uphill_x: unknown(), uphill_y: unknown(), steepness: unknown() };
+        let height = densities.len() / width;
+        if width < 3 || height < 3 {
+            return slopes;
+        }
+        let inner = width..(height - 1) * width;
+        slopes.uphill_x[inner.clone()]
+            .par_chunks_exact_mut(width)
+            .zip(slopes.uphill_y[inner.clone()].par_chunks_exact_mut(width))
+            .zip(slopes.steepness[inner].par_chunks_exact_mut(width))
+            .zip(densities.par_windows(3 * width).step_by(width))
+            .for_each(|(((x, y), steepness), rows)| {
+                let (below, rest) = rows.split_at(width);
+                sobel_row([below, &rest[..width], &rest[width..]], x, y, steepness);
+            });
+        slopes
     }
-    let [bl, b, br, l, r, tl, t, tr] = neighbours(cell, width).map(|other| densities[other]);
-    let (gx, gy) =
-        ((tr + 2.0 * r + br - tl - 2.0 * l - bl) / 8.0, (tl + 2.0 * t + tr - bl - 2.0 * b - br) / 8.0);
-    let steepness = (gx * gx + gy * gy).sqrt();
-    Slope { uphill: [gx / steepness, gy / steepness], steepness }
+}
+
+/// Gradients of the inner cells of a row from the row below, itself and the row above.
+fn sobel_row([below, own, above]: [&[f32]; 3], x: &mut [f32], y: &mut [f32], steepness: &mut [f32]) {
+    let count = own.len() - 2;
+    // Slices of one length, so that the compiler sees that no index leaves them.
+    let (bl, b, br) = (&below[..count], &below[1..][..count], &below[2..][..count]);
+    let (l, r) = (&own[..count], &own[2..][..count]);
+    let (tl, t, tr) = (&above[..count], &above[1..][..count], &above[2..][..count]);
+    let (x, y, steepness) = (&mut x[1..][..count], &mut y[1..][..count], &mut steepness[1..][..count]);
+    for (cell, ((x, y), steepness)) in x.iter_mut().zip(y).zip(steepness).enumerate() {
+        let gx = (tr[cell] + 2.0 * r[cell] + br[cell] - tl[cell] - 2.0 * l[cell] - bl[cell]) / 8.0;
+        let gy = (tl[cell] + 2.0 * t[cell] + tr[cell] - bl[cell] - 2.0 * b[cell] - br[cell]) / 8.0;
+        let length = (gx * gx + gy * gy).sqrt();
+        (*x, *y, *steepness) = (gx / length, gy / length, length);
+    }
 }
 
 /// The eight neighbours of an inner cell, lower row first, left to right.

@@ -83,14 +83,13 @@ impl KernelTest {
         test
     }
 
-    /// Failed tests of a particle of this heading (1/128 turns) on a cell of this code.
+    /// Failed tests of a particle of this heading (1/128 turns) on a cell of these codes.
     #[inline]
-    fn num_failed(&self, code: u16, heading: u8) -> usize {
-        let [density, direction] = code.to_le_bytes();
+    fn num_failed(&self, density: u8, direction: u8, heading: u8) -> u8 {
         let is_off = (density.wrapping_sub(self.low) > self.span) & (density != UNDEFINED);
         let turn = heading.wrapping_sub(direction).wrapping_add(self.turn_offset) & 127;
         let is_turned = (turn > self.turn_span) & (direction & STABLE != 0);
-        usize::from(is_off) + usize::from(is_turned)
+        u8::from(is_off) + u8::from(is_turned)
     }
 }
 
@@ -99,9 +98,14 @@ impl KernelTest {
 pub struct DensityModel<'a> {
     field: &'a DensityField,
     tests: [KernelTest; MAX_KERNELS],
-    /// Weight by number of failed tests.
-    weights: [f32; 2 * MAX_KERNELS + 1],
+    /// Weight by number of failed tests, and off the free space.
+    weights: [f32; OFF_THE_FLOOR + 1],
 }
+
+/// Particles weighed side by side.
+const LANES: usize = 16;
+/// Place in the table of weights that no number of failed tests reaches.
+const OFF_THE_FLOOR: usize = 2 * MAX_KERNELS + 1;
 
 impl<'a> DensityModel<'a> {
     /// Weights for what the robot sees now, one reading per kernel of the field; missing readings pass everybody.
@@ -110,28 +114,62 @@ impl<'a> DensityModel<'a> {
         for (test, reading) in tests.iter_mut().zip(readings).take(field.num_kernels()) {
             *test = KernelTest::new(reading, config);
         }
-        let weights = std::array::from_fn(|failed| config.penalty.powi(failed as i32) as f32);
+        let mut weights = std::array::from_fn(|failed| config.penalty.powi(failed as i32) as f32);
+        weights[OFF_THE_FLOOR] = 0.0;
         Self { field, tests, weights }
     }
 
     fn weigh_by<const STRIDE: usize>(&self, particles: &mut Particles) {
-        let scale = (1.0 / self.field.resolution_m()) as f32;
-        let (width, height) = (self.field.width() as f32, self.field.height() as f32);
         let tests: [KernelTest; STRIDE] = std::array::from_fn(|kernel| self.tests[kernel]);
-        let poses = particles.x_m.iter().zip(&particles.y_m).zip(&particles.heading_turns);
-        for (((x, y), heading), weight) in poses.zip(&mut particles.weight) {
-            let (column, row) = (x * scale, y * scale);
-            let is_inside = column >= 0.0 && row >= 0.0 && column < width && row < height;
-            let codes = if is_inside { self.field.codes_at(column as usize, row as usize) } else { None };
-            // A robot stands on free cells only.
-            let Some(codes) = codes.filter(|codes| codes[0].to_le_bytes()[0] != NOT_FREE) else {
-                *weight = 0.0;
-                continue;
-            };
-            let heading = (heading * 128.0 + 128.5) as i32 as u8;
-            let num_failed: usize =
-                tests.iter().zip(codes).map(|(test, &code)| test.num_failed(code, heading)).sum();
-            *weight *= self.weights[num_failed];
+        let (x_blocks, x_rest) = particles.x_m.as_chunks::<LANES>();
+        let (y_blocks, y_rest) = particles.y_m.as_chunks::<LANES>();
+        let (heading_blocks, heading_rest) = particles.heading_turns.as_chunks::<LANES>();
+        let (weight_blocks, weight_rest) = particles.weight.as_chunks_mut::<LANES>();
+        let blocks = x_blocks.iter().zip(y_blocks).zip(heading_blocks).zip(weight_blocks);
+        for (((x, y), heading), weight) in blocks {
+            self.weigh_block(&tests, [x, y, heading], weight);
+        }
+        let padded = |rest: &[f32]| {
+            let mut block = [0.0; LANES];
+            block[..rest.len()].copy_from_slice(rest);
+            block
+        };
+        let mut weight = padded(weight_rest);
+        self.weigh_block(&tests, [&padded(x_rest), &padded(y_rest), &padded(heading_rest)], &mut weight);
+        weight_rest.copy_from_slice(&weight[..weight_rest.len()]);
+    }
+
+    /// Weighs some particles side by side: first where their codes lie, then all codes, then all tests, so that no
+    /// particle waits for another's memory.
+    #[inline]
+    fn weigh_block<const STRIDE: usize>(
+        &self,
+        tests: &[KernelTest; STRIDE],
+        [x_m, y_m, heading_turns]: [&[f32; LANES]; 3],
+        weight: &mut [f32; LANES],
+    ) {
+        let starts = self.field.starts(x_m, y_m);
+        let mut densities = [[0u8; LANES]; STRIDE];
+        let mut directions = [[0u8; LANES]; STRIDE];
+        for (lane, &start) in starts.iter().enumerate() {
+            for (kernel, code) in self.field.codes_from::<STRIDE>(start).into_iter().enumerate() {
+                [densities[kernel][lane], directions[kernel][lane]] = code.to_le_bytes();
+            }
+        }
+        let headings = heading_turns.map(|turns| (turns * 128.0 + 128.5) as i32 as u8);
+        let mut num_failed = [0u8; LANES];
+        for ((test, densities), directions) in tests.iter().zip(&densities).zip(&directions) {
+            let codes = densities.iter().zip(directions);
+            for ((failed, (&density, &direction)), &heading) in
+                num_failed.iter_mut().zip(codes).zip(&headings)
+            {
+                *failed += test.num_failed(density, direction, heading);
+            }
+        }
+        // A robot stands on free cells only.
+        for ((weight, &density), &failed) in weight.iter_mut().zip(&densities[0]).zip(&num_failed) {
+            let is_free = density != NOT_FREE;
+            *weight *= self.weights[if is_free { usize::from(failed) } else { OFF_THE_FLOOR }];
         }
     }
 }

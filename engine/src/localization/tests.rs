@@ -66,7 +66,7 @@ fn byte_tests_weigh_as_the_equations_are_printed() {
         let robot = Pose2::new(-1.0, 8.3, 0.4);
         let seen = observe(&map.grid, &robot, &fields);
         let mut particles = Particles::default();
-        for _ in 0..2000 {
+        for _ in 0..2005 {
             let pose = Pose2::new(
                 rng.random_range(-4.5..8.5),
                 rng.random_range(6.5..16.5),
