@@ -10,6 +10,7 @@ use crate::mapping::MappingConfig;
 use crate::matching::MatchingConfig;
 use crate::registration::RefinerConfig;
 use crate::sampling::SamplingConfig;
+use crate::semantics::SemanticsConfig;
 use crate::text::{QuantizerConfig, TextConfig};
 
 /// A configuration value that cannot work.
@@ -41,6 +42,8 @@ pub struct EngineConfig {
     pub mapping: MappingConfig,
     /// How robots are found in the map.
     pub localization: LocalizationConfig,
+    /// How places are labelled.
+    pub semantics: SemanticsConfig,
 }
 
 impl EngineConfig {
@@ -53,6 +56,7 @@ impl EngineConfig {
         self.matching.validate("matching")?;
         self.mapping.validate("mapping")?;
         self.localization.validate("localization")?;
+        self.semantics.validate("semantics")?;
         Ok(())
     }
 }

@@ -5,8 +5,8 @@
 //! randomness. The same input gives the same bytes. Units are metres, radians and seconds throughout.
 //!
 //! Read the rooms in the order of the data flow:
-//! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] → [`matching`], [`retrieval`] → [`registration`] →
-//! [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
+//! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] →
+//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
 //! [`simulation`] and [`evaluation`], which feed and judge it.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]

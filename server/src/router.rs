@@ -65,6 +65,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(localisations::localise))
         .routes(routes!(localisations::query_example))
         .routes(routes!(queries::query_words))
+        .routes(routes!(queries::query_words_everywhere))
         .routes(routes!(labels::list_labels))
         .routes(routes!(labels::query_labels))
         .routes(routes!(places::list_places))

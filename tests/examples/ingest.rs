@@ -2,16 +2,19 @@
 //!
 //! `cargo run --release -p locution-tests --example ingest -- [RUNS] [SCANS] [BATCH] [json|cbor] [refined|raw]`
 //!
-//! Posts a simulated drive as several runs at once, one batch in flight per run, to a server of its own in a temporary
-//! directory, and prints scans per second, latency, CPU time, bytes on disk and memory.
+//! Posts a simulated drive as several runs at once to a server of its own in a temporary directory, over at most eight
+//! connections with one batch in flight each, and prints scans per second, latency, CPU time, bytes on disk and memory.
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use locution_tests::{Api, TestServer, drive_with, geometry_with};
 use serde_json::json;
 
 const NUM_RANGES: usize = 180;
+/// Connections, so that the memory of many open runs is not that of as many connections.
+const NUM_CONNECTIONS_MAX: usize = 8;
 
 struct Options {
     num_runs: usize,
@@ -42,7 +45,7 @@ fn main() {
 }
 
 async fn measure(options: Options) {
-    let bodies = bodies(&options);
+    let bodies = Arc::new(bodies(&options));
     let server = TestServer::start_with(|config| config.limits.num_open_runs_max = 10_000).await;
     let config = json!({"config": {"translator": {"odometry": options.odometry}}});
     server.api.put("/v1/sites/bench", &config).await.ok();
@@ -52,13 +55,15 @@ async fn measure(options: Options) {
     }
     let (before_s, before_kib) = (cpu_seconds(), resident_kib());
     let started = Instant::now();
-    let posting = (0..options.num_runs).map(|run| {
-        let (api, bodies, is_cbor) = (server.api.clone(), bodies.clone(), options.is_cbor);
-        tokio::spawn(async move { post(&api, run, &bodies, is_cbor).await })
+    let num_connections = options.num_runs.min(NUM_CONNECTIONS_MAX);
+    let posting = (0..num_connections).map(|first_run| {
+        let runs: Vec<usize> = (first_run..options.num_runs).step_by(num_connections).collect();
+        let (api, bodies, is_cbor) = (server.api.clone(), Arc::clone(&bodies), options.is_cbor);
+        tokio::spawn(async move { post(&api, &runs, &bodies, is_cbor).await })
     });
     let mut latencies = Vec::new();
-    for run in posting.collect::<Vec<_>>() {
-        latencies.extend(run.await.unwrap());
+    for connection in posting.collect::<Vec<_>>() {
+        latencies.extend(connection.await.unwrap());
     }
     let elapsed_s = started.elapsed().as_secs_f64();
     latencies.sort_unstable();
@@ -98,15 +103,18 @@ fn bodies(options: &Options) -> Vec<Vec<u8>> {
         .collect()
 }
 
-async fn post(api: &Api, run: usize, bodies: &[Vec<u8>], is_cbor: bool) -> Vec<Duration> {
+/// Posts every batch to each of the runs in turn.
+async fn post(api: &Api, runs: &[usize], bodies: &[Vec<u8>], is_cbor: bool) -> Vec<Duration> {
     let content_type = if is_cbor { "application/cbor" } else { "application/json" };
-    let path = format!("/v1/sites/bench/runs/r{run}/batches");
-    let mut latencies = Vec::with_capacity(bodies.len());
+    let headers = [("content-type", content_type)];
+    let mut latencies = Vec::with_capacity(runs.len() * bodies.len());
     for body in bodies {
-        let started = Instant::now();
-        let headers = [("content-type", content_type)];
-        api.send(reqwest::Method::POST, &path, &headers, body.clone()).await.unwrap().ok();
-        latencies.push(started.elapsed());
+        for run in runs {
+            let path = format!("/v1/sites/bench/runs/r{run}/batches");
+            let started = Instant::now();
+            api.send(reqwest::Method::POST, &path, &headers, body.clone()).await.unwrap().ok();
+            latencies.push(started.elapsed());
+        }
     }
     latencies
 }

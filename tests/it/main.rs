@@ -8,3 +8,4 @@ mod changes;
 mod crash;
 mod maps;
 mod sites;
+mod words;

@@ -17,10 +17,11 @@ pub(super) struct Kernel {
     pub bandwidth: f64,
     /// Columns left and right of the centre within the support, by distance from the centre's row.
     pub half_widths: Vec<i32>,
-    /// For each row distance, sums of the weights of all cells left of a column, from the row's first.
+    /// For each row distance, sums of the weights of all cells left of a column, from the row's first; none for
+    /// a uniform kernel.
     prefix_sums: Vec<Vec<u32>>,
     total: u64,
-    /// The weight of every cell, where it is one: then cells need only be counted.
+    /// The weight of every cell of a uniform kernel, whose cells need only be counted.
     uniform_weight: Option<u64>,
 }
 
@@ -64,6 +65,7 @@ impl Kernel {
             .sum();
         let is_uniform = config.profile == KernelProfile::Uniform;
         let uniform_weight = is_uniform.then(|| prefix_sums.first().map_or(0, |sums| u64::from(sums[1])));
+        let prefix_sums = if is_uniform { Vec::new() } else { prefix_sums };
         Self { bandwidth, half_widths, prefix_sums, total, uniform_weight }
     }
 

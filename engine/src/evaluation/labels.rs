@@ -43,17 +43,18 @@ pub struct LabelReport {
 /// Judges the observations of all runs; each run in order of travel.
 ///
 /// A prediction within a metre of a change of the true label is right if it names either side: the border may lie
-/// there, so it counts as an observation of that side. Without a prediction the predicted label is `none`;
-/// observations without a true label are left out.
+/// there. It counts as right for the label that the observation truly has, so that every label keeps its number of
+/// observations, as in the thesis. Without a prediction the predicted label is `none`; observations without a true
+/// label are left out.
 pub fn judge_labels(runs: &[Vec<LabelledObservation<'_>>]) -> LabelReport {
     let mut confusion: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
     for run in runs {
         for (idx, observation) in run.iter().enumerate() {
             let Some(actual) = observation.actual else { continue };
             let predicted = observation.predicted.unwrap_or("none");
-            let judged_as = if is_near(run, idx, predicted) { predicted } else { actual };
-            let row = confusion.entry(judged_as.to_owned()).or_default();
-            *row.entry(predicted.to_owned()).or_default() += 1;
+            let judged_as = if is_near(run, idx, predicted) { actual } else { predicted };
+            let row = confusion.entry(actual.to_owned()).or_default();
+            *row.entry(judged_as.to_owned()).or_default() += 1;
         }
     }
     let labels = confusion
@@ -100,11 +101,11 @@ mod tests {
             })
             .collect();
         let report = judge_labels(&[run]);
-        // Corners 50 to 59 are within a metre of the corridor and count as corridor; 60 to 64 are errors.
+        // Corners 50 to 59 are within a metre of the corridor and may be called so; 60 to 64 are errors.
         assert_eq!(report.confusion["corner"]["corridor"], 5);
-        assert_eq!(report.confusion["corridor"]["corridor"], 60);
-        assert_eq!(report.labels["corner"], LabelScore { precision: 1.0, recall: 35.0 / 40.0, support: 40 });
-        assert_eq!(report.labels["corridor"].precision, 60.0 / 65.0);
+        assert_eq!(report.confusion["corridor"]["corridor"], 50);
+        assert_eq!(report.labels["corner"], LabelScore { precision: 1.0, recall: 45.0 / 50.0, support: 50 });
+        assert_eq!(report.labels["corridor"].precision, 50.0 / 55.0);
     }
 
     #[test]

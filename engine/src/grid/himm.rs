@@ -119,27 +119,29 @@ impl LocalMap {
         let laser = Cell::containing(&map_from_laser.position(), self.config.resolution_m);
         self.move_to(robot);
         self.laser.set_limits(ranges_m, &self.config);
-        self.mark_seen(laser, self.laser.first_edge(&map_from_laser));
+        let mut seen = self.cells_seen(laser, self.laser.first_edge(&map_from_laser));
         if laser != robot {
-            self.unmark_beyond_radius(laser, robot);
+            self.unmark_beyond_radius(&mut seen, laser, robot);
         }
-        self.apply_seen();
+        self.apply(&seen);
         for cell in cells_between(robot, laser) {
             self.stamp_footprint(cell);
         }
     }
 
-    fn unmark_beyond_radius(&mut self, laser: Cell, robot: Cell) {
+    fn unmark_beyond_radius(&self, seen: &mut Seen, laser: Cell, robot: Cell) {
         for (start, len) in self.outside(laser, robot) {
             for_each_word(start, len, self.index_mask(), |word, mask| {
-                self.seen.free[word] &= !mask;
-                self.seen.hit[word] &= !mask;
+                seen.free[word] &= !mask;
+                seen.hit[word] &= !mask;
             });
         }
     }
 
     /// Collects the cells before and around the readings, seen from the laser's cell.
-    fn mark_seen(&mut self, laser_cell: Cell, first_edge: u32) {
+    fn cells_seen(&self, laser_cell: Cell, first_edge: u32) -> Seen {
+        // Made anew for each scan: kept, it would be a good part of what an open run weighs.
+        let mut seen = Seen::new(self.num_words());
         let (base, index_mask, side) = (self.index(laser_cell) as i32, self.index_mask(), self.side());
         // A quarter turn maps (dx, dy) to (−dy, dx); on the helix a column counts 1 and a row counts `side`.
         let quarter_turns = [(1, side), (side, -1), (-1, -side), (-side, 1)];
@@ -159,12 +161,12 @@ impl LocalMap {
             let beams =
                 (self.laser.beam_at(from_edge), self.laser.beam_at(from_edge.wrapping_add(SECTOR_WIDTH - 1)));
             if beams.0 == beams.1 {
-                self.seen.mark_beam(cells, &self.laser.limits[beams.0], bit_of);
+                seen.mark_beam(cells, &self.laser.limits[beams.0], bit_of);
             } else {
-                let turned = ((quadrant as u32) << 30).wrapping_sub(first_edge);
-                self.seen.mark_beams(cells, &self.laser, beams, turned, bit_of);
+                seen.mark_beams(cells, &self.laser, beams, from_edge, bit_of);
             }
         }
+        seen
     }
 }
 
@@ -185,33 +187,33 @@ impl Seen {
     fn mark_beam(&mut self, cells: &[ViewCell], limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
         let mut rest = cells.iter();
         for cell in rest.by_ref() {
-            if u32::from(cell.squared) >= limits.free_end {
+            if cell.squared() >= limits.free_end {
                 mark_hit(&mut self.hit, cell, limits, &bit_of);
                 break;
             }
             insert(&mut self.free, bit_of(cell));
         }
         for cell in rest {
-            if u32::from(cell.squared) >= limits.hit_end {
+            if cell.squared() >= limits.hit_end {
                 break;
             }
             mark_hit(&mut self.hit, cell, limits, &bit_of);
         }
     }
 
-    /// Marks the cells of a sector in which beams meet; `turned` leads from a cell's angle to that from the first edge.
+    /// Marks the cells of a sector in which beams meet; the sector begins `from_edge` behind the first edge.
     #[inline]
     fn mark_beams(
         &mut self,
         cells: &[ViewCell],
         laser: &Laser,
         (first, last): (usize, usize),
-        turned: u32,
+        from_edge: u32,
         bit_of: impl Fn(&ViewCell) -> usize,
     ) {
         let (free_for_all, reach) = common_limits(&laser.limits, first, last);
         for cell in cells {
-            let squared = u32::from(cell.squared);
+            let squared = cell.squared();
             if squared < free_for_all {
                 insert(&mut self.free, bit_of(cell));
                 continue;
@@ -219,7 +221,7 @@ impl Seen {
             if squared >= reach {
                 break;
             }
-            let limits = &laser.limits[laser.beam_at(cell.angle.wrapping_add(turned))];
+            let limits = &laser.limits[laser.beam_at(from_edge.wrapping_add(cell.angle_in_sector()))];
             if squared < limits.free_end {
                 insert(&mut self.free, bit_of(cell));
             } else {
@@ -234,7 +236,7 @@ fn insert(bits: &mut [u64], bit: usize) {
 }
 
 fn mark_hit(hit: &mut [u64], cell: &ViewCell, limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
-    if (limits.hit_begin..limits.hit_end).contains(&u32::from(cell.squared)) {
+    if (limits.hit_begin..limits.hit_end).contains(&cell.squared()) {
         insert(hit, bit_of(cell));
     }
 }

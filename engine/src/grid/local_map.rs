@@ -27,7 +27,6 @@ pub struct LocalMap {
     half_widths: Vec<i32>,
     /// Cells under the robot, relative to it.
     footprint: Vec<(i32, i32)>,
-    pub(super) seen: Seen,
 }
 
 impl LocalMap {
@@ -47,7 +46,6 @@ impl LocalMap {
             words: vec![bit_planes::filled(config.initial); num_words],
             half_widths: half_widths(radius),
             footprint: disc(config.robot_radius_m / config.resolution_m),
-            seen: Seen::new(num_words),
         }
     }
 
@@ -141,20 +139,23 @@ impl LocalMap {
         stretches
     }
 
-    /// Applies what the scan at hand saw, and forgets what it was.
-    pub(super) fn apply_seen(&mut self) {
-        let seen = self.seen.free.iter_mut().zip(&mut self.seen.hit);
-        for (planes, (free, hit)) in self.words.iter_mut().zip(seen) {
-            if *free | *hit == 0 {
+    /// Words of the storage, 64 cells each.
+    pub(super) fn num_words(&self) -> usize {
+        self.words.len()
+    }
+
+    /// Applies what a scan saw.
+    pub(super) fn apply(&mut self, seen: &Seen) {
+        for (planes, (&free, &hit)) in self.words.iter_mut().zip(seen.free.iter().zip(&seen.hit)) {
+            if free | hit == 0 {
                 continue;
             }
             for _ in 0..self.config.free_decrement {
-                bit_planes::decrement(planes, *free);
+                bit_planes::decrement(planes, free);
             }
             for _ in 0..self.config.hit_increment {
-                bit_planes::increment(planes, *hit);
+                bit_planes::increment(planes, hit);
             }
-            (*free, *hit) = (0, 0);
         }
     }
 

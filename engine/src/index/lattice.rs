@@ -45,34 +45,71 @@ pub const fn num_nodes_covered(level: usize) -> usize {
     if level == 0 { 1 } else { level + 2 }
 }
 
-/// The words of one level, one entry per node.
+/// The words of one level: by the node they end at, and in a row.
 #[derive(Clone, Debug, Default)]
 pub struct LevelColumns {
-    /// Density class, or no word's class where no word of this level ends.
+    /// One entry per node; no word's class where no word of this level ends.
+    pub by_node: WordColumns,
+    /// One entry per word, by its index within the level.
+    pub in_row: WordColumns,
+    /// Where each word of the level ends, by its index.
+    pub ends: Vec<u32>,
+    /// Index of the word within its level, one entry per node.
+    index: Vec<u32>,
+}
+
+/// Words as columns of their syllables.
+#[derive(Clone, Debug, Default)]
+pub struct WordColumns {
+    /// Density class.
     pub class: Vec<u16>,
     /// Number of observations.
     pub size: Vec<u16>,
     /// Turn as a binary angle.
     pub turn: Vec<i16>,
-    /// Index of the word within its level.
-    index: Vec<u32>,
-    /// Where each word of the level ends, by its index.
-    ends: Vec<u32>,
+}
+
+impl WordColumns {
+    /// Classes, sizes and turns of a range of entries, which must lie within them.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> (&[u16], &[u16], &[i16]) {
+        (&self.class[range.clone()], &self.size[range.clone()], &self.turn[range])
+    }
+
+    fn append(&mut self, other: &Self) {
+        self.class.extend_from_slice(&other.class);
+        self.size.extend_from_slice(&other.size);
+        self.turn.extend_from_slice(&other.turn);
+    }
+
+    fn push(&mut self, word: Syllables) {
+        self.class.push(word.class);
+        self.size.push(word.size);
+        self.turn.push(word.turn);
+    }
 }
 
 impl LevelColumns {
     fn push_absent(&mut self) {
-        self.class.push(ABSENT);
-        self.size.push(0);
-        self.turn.push(0);
+        self.by_node.push(Syllables { class: ABSENT, size: 0, turn: 0 });
         self.index.push(u32::MAX);
+    }
+
+    fn append(&mut self, other: &Self, first_node: usize) {
+        let first_word = self.ends.len() as u32;
+        self.by_node.append(&other.by_node);
+        self.in_row.append(&other.in_row);
+        self.ends.extend(other.ends.iter().map(|end| end + first_node as u32));
+        // The mark of a node without a word stays as it is.
+        let renumbered = |&index: &u32| if index == u32::MAX { index } else { index + first_word };
+        self.index.extend(other.index.iter().map(renumbered));
     }
 
     fn set(&mut self, node: usize, word: &Word) {
         let syllables = Syllables::of(word);
-        self.class[node] = syllables.class;
-        self.size[node] = syllables.size;
-        self.turn[node] = syllables.turn;
+        self.by_node.class[node] = syllables.class;
+        self.by_node.size[node] = syllables.size;
+        self.by_node.turn[node] = syllables.turn;
+        self.in_row.push(syllables);
         self.index[node] = word.id.index;
         self.ends.push(node as u32);
     }
@@ -94,6 +131,36 @@ impl Lattice {
         let mut lattice = Self::default();
         lattice.extend(words)?;
         Ok(lattice)
+    }
+
+    /// Several texts one after the other, with a node at which no word ends between any two, so that no chain leads from
+    /// one to the next. Words and observations are numbered anew.
+    pub fn joined(texts: &[&Self]) -> Self {
+        let mut joined = Self::default();
+        let num_levels = texts.iter().map(|text| text.num_levels()).max().unwrap_or(0);
+        joined.levels.resize_with(num_levels, LevelColumns::default);
+        for text in texts {
+            if !joined.observations.is_empty() {
+                let last = joined.last_observation();
+                joined.observations.push((last, last));
+                joined.levels.iter_mut().for_each(LevelColumns::push_absent);
+            }
+            let (first_node, offset) = (joined.num_nodes(), joined.last_observation());
+            joined
+                .observations
+                .extend(text.observations.iter().map(|span| (span.0 + offset, span.1 + offset)));
+            for (level, columns) in joined.levels.iter_mut().enumerate() {
+                match text.levels.get(level) {
+                    Some(other) => columns.append(other, first_node),
+                    None => (0..text.num_nodes()).for_each(|_| columns.push_absent()),
+                }
+            }
+        }
+        joined
+    }
+
+    fn last_observation(&self) -> u32 {
+        self.observations.last().map_or(0, |span| span.1)
     }
 
     /// Adds words at the end of the text: level-0 words that follow the last one and the alternatives among them.
@@ -157,7 +224,7 @@ impl Lattice {
 
     /// Number of words over all levels.
     pub fn num_words(&self) -> usize {
-        self.levels.iter().map(|level| level.class.iter().filter(|&&class| class != ABSENT).count()).sum()
+        self.levels.iter().map(|level| level.ends.len()).sum()
     }
 
     /// The columns of a level; empty for a level that no word has.
@@ -167,7 +234,7 @@ impl Lattice {
 
     /// The word of `level` that ends at `node`, if there is one.
     pub fn word_ending_at(&self, node: usize, level: usize) -> Option<Syllables> {
-        let columns = self.levels.get(level)?;
+        let columns = &self.levels.get(level)?.by_node;
         let class = *columns.class.get(node)?;
         (class != ABSENT).then(|| Syllables { class, size: columns.size[node], turn: columns.turn[node] })
     }
@@ -178,11 +245,15 @@ impl Lattice {
         (index != u32::MAX).then_some(WordId { level: level as u8, index })
     }
 
+    /// The node a word ends at.
+    pub fn end_of(&self, id: WordId) -> Option<usize> {
+        self.levels.get(usize::from(id.level))?.ends.get(id.index as usize).map(|&end| end as usize)
+    }
+
     /// First and last observation of a word, both inclusive.
     pub fn observations_of(&self, id: WordId) -> Option<(u32, u32)> {
-        let level = usize::from(id.level);
-        let end = *self.levels.get(level)?.ends.get(id.index as usize)? as usize;
-        Some(self.observations(end + 1 - num_nodes_covered(level), end))
+        let end = self.end_of(id)?;
+        Some(self.observations(end + 1 - num_nodes_covered(usize::from(id.level)), end))
     }
 
     /// First and last observation of a stretch of nodes, both inclusive.

@@ -1,7 +1,24 @@
-//! The occurrence index: where each word of a site occurs (thesis Algorithm 5.3).
+//! The occurrence index: where each word of a site occurs (thesis Algorithm 5.3, SPEC section 5).
+//!
+//! [`Lattice`] is one run's text arranged for comparing it with another, [`OccurrenceIndex`] is all texts of a site
+//! packed for questions.
 
 mod lattice;
+mod occurrence;
+mod packed;
+mod pattern;
+mod radix;
+mod reading;
+mod search;
 mod tolerance;
 
-pub use lattice::{Lattice, LatticeError, LevelColumns, num_nodes_covered};
+#[cfg(test)]
+mod search_tests;
+
+pub use lattice::{Lattice, LatticeError, LevelColumns, WordColumns, num_nodes_covered};
+pub use occurrence::OccurrenceIndex;
+pub use packed::{STORED_WORD_BYTES, store_words};
+pub use pattern::{TextQuery, WordConstraint};
+pub use reading::{ReadWord, TextReading};
+pub use search::TextMatch;
 pub use tolerance::{Syllables, WordTolerance, WordWindow, binary_angle};

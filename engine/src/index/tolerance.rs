@@ -55,18 +55,18 @@ impl WordTolerance {
         let sizes_match =
             |a: u16, b: u16| f64::from(a.abs_diff(b)) < self.size_ratio * f64::from(a.max(b)) || a == b;
         let size = f64::from(word.size);
-        // The bounds are guessed in floating point and corrected by the predicate itself.
-        let mut size_min = (size * (1.0 - self.size_ratio)).floor() as u16;
+        // The bounds are guessed in floating point and corrected by the predicate itself. Casts round down and stop at
+        // the ends of the range.
+        let mut size_min = (size * (1.0 - self.size_ratio)) as u16;
         while !sizes_match(word.size, size_min) {
             size_min += 1;
         }
-        let mut size_max = (size / (1.0 - self.size_ratio)).ceil().min(f64::from(u16::MAX)) as u16;
+        let mut size_max = (size / (1.0 - self.size_ratio) + 1.0) as u16;
         while !sizes_match(word.size, size_max) {
             size_max -= 1;
         }
         // One unit (0.005°) more, so that words at exactly ε_a match whichever way their turns were rounded.
-        let reach =
-            ((self.turn_rad / PI * UNITS_PER_PI).floor() as u16).saturating_add(1).min(i16::MAX as u16);
+        let reach = ((self.turn_rad / PI * UNITS_PER_PI) as u16).saturating_add(1).min(i16::MAX as u16);
         WordWindow {
             class: word.class,
             size_min,

@@ -180,6 +180,10 @@ fn turn_rows<const W: usize>(
             for (bits, row) in square.iter_mut().zip(group * 64..num_rows) {
                 *bits = word(row, first_column + start);
             }
+            // Most of a map is far from the unknown: what is empty need not be turned.
+            if square.iter().fold(0, |all, bits| all | bits) == 0 {
+                continue;
+            }
             turn(&mut square);
             for (arc, &bits) in into[start..].iter_mut().zip(&square) {
                 arc[group] = bits;
@@ -190,18 +194,24 @@ fn turn_rows<const W: usize>(
 
 /// Transposes 64 × 64 bits in place, by swapping ever smaller blocks (Hacker's Delight, section 7-3).
 fn turn(square: &mut [u64; 64]) {
-    let mut side = 32;
-    let mut mask = 0x0000_0000_ffff_ffffu64;
-    while side > 0 {
-        let mut row = 0;
-        while row < 64 {
-            let swapped = (square[row] >> side ^ square[row + side]) & mask;
-            square[row + side] ^= swapped;
-            square[row] ^= swapped << side;
-            row = (row + side + 1) & !side;
+    swap_blocks::<32>(square, 0x0000_0000_ffff_ffff);
+    swap_blocks::<16>(square, 0x0000_ffff_0000_ffff);
+    swap_blocks::<8>(square, 0x00ff_00ff_00ff_00ff);
+    swap_blocks::<4>(square, 0x0f0f_0f0f_0f0f_0f0f);
+    swap_blocks::<2>(square, 0x3333_3333_3333_3333);
+    swap_blocks::<1>(square, 0x5555_5555_5555_5555);
+}
+
+/// Swaps the off-diagonal blocks of `SIDE` × `SIDE` bits; the sides are known to the compiler, so that it can take
+/// several rows at once.
+fn swap_blocks<const SIDE: usize>(square: &mut [u64; 64], mask: u64) {
+    for pair in square.chunks_exact_mut(2 * SIDE) {
+        let (low, high) = pair.split_at_mut(SIDE);
+        for (low, high) in low.iter_mut().zip(high) {
+            let swapped = (*low >> SIDE ^ *high) & mask;
+            *high ^= swapped;
+            *low ^= swapped << SIDE;
         }
-        side /= 2;
-        mask ^= mask << side;
     }
 }
 

@@ -155,11 +155,6 @@ impl BitPlanes {
         self.free[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
     }
 
-    /// True when a padded cell is free and has an unknown neighbour.
-    pub fn is_open(&self, row: usize, column: usize) -> bool {
-        self.open[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
-    }
-
     /// Eight free bits from a padded cell on to the right.
     pub fn free_byte(&self, row: usize, column: usize) -> u64 {
         self.row::<1>(&self.free, row, column)[0] & 0xff

@@ -52,7 +52,9 @@ pub(super) struct DiscSweep<'a, const W: usize> {
     left: usize,
     num_reached: u32,
     num_open: u32,
+    /// Reached cells, and cells of runs perhaps not reached yet, from which a flood goes on.
     stack: Vec<(usize, usize)>,
+    runs: Vec<(usize, usize)>,
 }
 
 impl<'a, const W: usize> DiscSweep<'a, W> {
@@ -71,6 +73,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             num_reached: 0,
             num_open: 0,
             stack: Vec::new(),
+            runs: Vec::new(),
         }
     }
 
@@ -210,24 +213,52 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         self.flood_on(arc);
     }
 
-    /// Spreads from the cells on the stack, cell by cell.
+    /// Spreads from the reached cells on the stack to whatever hangs on them.
     fn flood_on(&mut self, arc: usize) {
         let centre = self.left + arc;
-        while let Some((row, column)) = self.stack.pop() {
+        for _ in 0..self.stack.len() {
+            let Some((row, column)) = self.stack.pop() else { break };
             for (row, column) in
                 [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)]
             {
-                if row >= self.shape.num_rows() || column.abs_diff(centre) > self.shape.half_chords[row] {
-                    continue;
-                }
-                let entered = column - self.shape.half_chords[row] - self.left;
-                if self.is_free(row, column) && !has(&self.reach[entered], row) {
-                    self.reach[entered][row / 64] |= 1 << (row % 64);
-                    self.num_reached += 1;
-                    self.num_open += u32::from(self.planes.is_open(self.bottom + row, column));
-                    self.stack.push((row, column));
+                if row < self.shape.num_rows() && column.abs_diff(centre) <= self.shape.half_chords[row] {
+                    self.runs.push((row, column));
                 }
             }
+        }
+        while let Some((row, column)) = self.runs.pop() {
+            let entered = column - self.shape.half_chords[row] - self.left;
+            if self.is_free(row, column) && !has(&self.reach[entered], row) {
+                self.take_run(row, column, centre - self.kernel.radius());
+            }
+        }
+    }
+
+    /// Takes the run of free cells around a cell that is not reached into the fill and notes where it goes on; `left`
+    /// is the disc's leftmost column.
+    ///
+    /// Cells of a run are reached together, except that the cell which has just entered may be ahead of the others.
+    fn take_run(&mut self, row: usize, column: usize, left: usize) {
+        let bit = (column - left) as i64;
+        let free = |row: usize| and(&self.planes.free_row(self.bottom + row, left), &self.shape.disc[row]);
+        let run = spread(&span(bit, bit), &free(row));
+        for beside in [row.wrapping_sub(1), row + 1] {
+            if beside < self.shape.num_rows() {
+                let touched = and(&run, &free(beside));
+                let starts = and_not(&touched, &shifted_right(&touched));
+                self.runs.extend(set_bits(&starts).map(|bit| (beside, left + bit)));
+            }
+        }
+        let open = and(&run, &self.planes.open_row(self.bottom + row, left));
+        let (word, cell) = (row / 64, 1u64 << (row % 64));
+        // Bits count from the disc's leftmost column, arcs from half a chord before that.
+        let first_arc = left - self.shape.half_chords[row] - self.left;
+        for bit in set_bits(&run) {
+            let arc = &mut self.reach[first_arc + bit][word];
+            let is_new = u32::from(*arc & cell == 0);
+            *arc |= cell;
+            self.num_reached += is_new;
+            self.num_open += is_new & u32::from(has(&open, bit));
         }
     }
 

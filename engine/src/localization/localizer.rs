@@ -53,7 +53,9 @@ pub struct LocalizerConfig {
     pub min_travel_m: f64,
     /// Probability from which on the robot may be found …
     pub sure_probability: f64,
-    /// … once it has lasted for this much travel, metres: look-alikes lead for a moment, not for long.
+    /// … once one place has had at least this probability …
+    pub leading_probability: f64,
+    /// … for this much travel, metres: look-alikes lead for a moment, not for long.
     pub sure_for_m: f64,
 }
 
@@ -74,6 +76,7 @@ impl Default for LocalizerConfig {
             agreement_sure: 0.75,
             min_travel_m: 3.0,
             sure_probability: 0.99,
+            leading_probability: 0.9,
             sure_for_m: 2.0,
         }
     }
@@ -103,6 +106,7 @@ impl LocalizerConfig {
             ("agreement_elsewhere", self.agreement_elsewhere),
             ("agreement_sure", self.agreement_sure),
             ("sure_probability", self.sure_probability),
+            ("leading_probability", self.leading_probability),
         ];
         for (name, value) in shares {
             if !(0.0..=1.0).contains(&value) {
@@ -155,8 +159,8 @@ pub struct Localizer {
     run_from_robot: Pose2,
     travel_m: f64,
     searched_at_m: Option<f64>,
-    /// Travel since which one place has been probable enough.
-    sure_since_m: Option<f64>,
+    /// Travel since which one place has led.
+    leading_since_m: Option<f64>,
     state: LocalizationState,
 }
 
@@ -179,7 +183,7 @@ impl Localizer {
             run_from_robot: Pose2::identity(),
             travel_m: 0.0,
             searched_at_m: None,
-            sure_since_m: None,
+            leading_since_m: None,
             state: LocalizationState::Lost,
         }
     }
@@ -288,7 +292,7 @@ impl Localizer {
                 self.forget_oldest();
             }
             self.tracks.clear();
-            (self.searched_at_m, self.sure_since_m) = (None, None);
+            (self.searched_at_m, self.leading_since_m) = (None, None);
         }
     }
 
@@ -347,18 +351,22 @@ impl Localizer {
         weights.iter().map(|weight| weight / total).collect()
     }
 
-    /// Says whether the robot is found, and notes since when one place has been probable enough.
+    /// Says whether the robot is found, and notes since when one place has led.
     fn decide(&mut self) -> LocalizationState {
+        let config = &self.config;
         let probabilities = self.probabilities();
         let known: f64 = probabilities.iter().sum();
-        let is_sure = self.tracks.first().zip(probabilities.first()).is_some_and(|(best, &probability)| {
-            probability >= self.config.sure_probability
-                && best.recent(usize::MAX).share >= self.config.agreement_sure
+        let best = self.tracks.first().zip(probabilities.first());
+        let (fits, probability) = best.map_or((false, 0.0), |(best, &probability)| {
+            (best.recent(usize::MAX).share >= config.agreement_sure, probability)
         });
-        self.sure_since_m = if is_sure { self.sure_since_m.or(Some(self.travel_m)) } else { None };
+        let leads = fits && probability >= config.leading_probability;
+        self.leading_since_m = if leads { self.leading_since_m.or(Some(self.travel_m)) } else { None };
         let has_lasted =
-            self.sure_since_m.is_some_and(|since_m| self.travel_m - since_m >= self.config.sure_for_m);
-        match (has_lasted && self.travel_m >= self.config.min_travel_m, known > 0.5) {
+            self.leading_since_m.is_some_and(|since_m| self.travel_m - since_m >= config.sure_for_m);
+        // A robot that is found stays found while its place leads: the next search may propose a place just beside.
+        let is_sure = probability >= config.sure_probability || self.state == LocalizationState::Converged;
+        match (has_lasted && is_sure && self.travel_m >= config.min_travel_m, known > 0.5) {
             (true, _) => LocalizationState::Converged,
             (false, true) => LocalizationState::Ambiguous,
             (false, false) => LocalizationState::Lost,

@@ -18,6 +18,7 @@ mod placement;
 mod run;
 mod site_map;
 mod stretches;
+mod text_evidence;
 
 pub use changes::{Change, ChangeKind, ChangesConfig, PlacedRun, find_changes};
 pub use config::MappingConfig;
@@ -28,5 +29,6 @@ pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Regis
 pub use placement::{place_in_map, place_observations};
 pub use run::{Keyframe, RunRecord};
 pub use site_map::{MappedRun, SiteMap};
+pub use text_evidence::weigh_texts;
 
 pub use crate::text::{Direction, Interval};

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::MatchingConfig;
 use super::rows::{Comparison, Rows};
-use crate::index::{Lattice, num_nodes_covered};
+use crate::index::{Lattice, WordWindow, num_nodes_covered};
 use crate::text::{Direction, WordId};
 
 /// A maximal n-gram match: words of two texts that match pair by pair along predecessor links (Eq 5.2).
@@ -71,6 +71,36 @@ pub fn find_chains(
     finder.chains(earlier, later)
 }
 
+/// All maximal chains between each of several texts of other runs and a later one, with the number of the text:
+/// what [`find_chains`] finds one by one. Short texts are compared as one long text, which costs far less.
+pub fn find_chains_in(texts: &[&Lattice], later: &Lattice, config: &MatchingConfig) -> Vec<(usize, Chain)> {
+    let joined = Lattice::joined(texts);
+    // Where each text begins; empty texts have a node of their own to stand behind.
+    let mut starts = Vec::with_capacity(texts.len());
+    let mut next = 0;
+    for text in texts {
+        let start = if next == 0 { 0 } else { next + 1 };
+        starts.push(start);
+        next = start + text.num_nodes();
+    }
+    let in_text = |id: WordId| {
+        let end = joined.end_of(id)?;
+        let text = starts.partition_point(|&start| start <= end).checked_sub(1)?;
+        Some((text, texts[text].id_ending_at(end - starts[text], usize::from(id.level))?))
+    };
+    let mut chains = Vec::new();
+    for mut chain in find_chains(&joined, later, Relation::DifferentRuns, config) {
+        let mut text_idx = None;
+        for (earlier, _) in &mut chain.pairs {
+            let Some((text, id)) = in_text(*earlier) else { continue };
+            (text_idx, *earlier) = (Some(text), id);
+        }
+        chains.extend(text_idx.map(|text| (text, chain)));
+    }
+    chains.sort_by_key(|found| found.0);
+    chains
+}
+
 impl ChainFinder {
     /// Nothing compared yet.
     pub fn new(relation: Relation, config: MatchingConfig) -> Self {
@@ -90,15 +120,19 @@ impl ChainFinder {
     /// Alternative words that end at a node become known with the node after it, so the newest row is filled again.
     pub fn extend(&mut self, earlier: &Lattice, later: &Lattice) {
         for pass in &mut self.passes {
-            let texts = comparison(&self.config, self.relation, pass.direction, earlier, later);
             pass.rows.grow_columns(earlier.num_nodes());
             pass.rows.pop();
             while pass.ends.last().is_some_and(|end| end.later_node >= pass.rows.next_node()) {
                 pass.ends.pop();
             }
-            while pass.rows.next_node() < later.num_nodes() {
-                pass.rows.push(&texts);
-                pass.collect_ends();
+        }
+        // All passes of a direction have come equally far and compare with the same words.
+        let max_level = self.config.min_chain_words.len().saturating_sub(1);
+        for passes in self.passes.chunk_by_mut(|a, b| a.direction == b.direction) {
+            let texts = comparison(&self.config, self.relation, passes[0].direction, earlier, later);
+            for node in passes[0].rows.next_node()..later.num_nodes() {
+                let windows = texts.windows(node, max_level);
+                passes.iter_mut().for_each(|pass| pass.extend(&texts, &windows));
             }
         }
     }
@@ -108,12 +142,19 @@ impl ChainFinder {
     pub fn chains(&self, earlier: &Lattice, later: &Lattice) -> Vec<Chain> {
         let mut chains: Vec<Chain> = Vec::new();
         let mut known = BTreeSet::new();
-        for pass in &self.passes {
-            let texts = comparison(&self.config, self.relation, pass.direction, earlier, later);
-            let ends = pass.ends.iter().filter(|end| !continues(&texts, pass.max_level, end));
-            for chain in ends.map(|end| trace(&texts, pass.max_level, end)) {
-                if known.insert((chain.direction, chain.pairs.clone())) {
-                    chains.push(chain);
+        let max_level = self.config.min_chain_words.len().saturating_sub(1);
+        for passes in self.passes.chunk_by(|a, b| a.direction == b.direction) {
+            if passes.iter().all(|pass| pass.ends.is_empty()) {
+                continue;
+            }
+            let texts = comparison(&self.config, self.relation, passes[0].direction, earlier, later);
+            let windows: Vec<_> = (0..later.num_nodes()).map(|node| texts.windows(node, max_level)).collect();
+            for pass in passes {
+                let ends = pass.ends.iter().filter(|end| !continues(&texts, pass.max_level, end));
+                for chain in ends.map(|end| trace(&texts, &windows, pass.max_level, end)) {
+                    if known.insert((chain.direction, chain.pairs.clone())) {
+                        chains.push(chain);
+                    }
                 }
             }
         }
@@ -122,19 +163,15 @@ impl ChainFinder {
 }
 
 impl Pass {
-    fn collect_ends(&mut self) {
-        let later_node = self.rows.next_node() - 1;
-        let Some(row) = self.rows.row(later_node) else { return };
-        // Long chains are rare: whole blocks are dismissed by their maximum, which is vector code.
-        for (block_idx, block) in row.chunks(64).enumerate() {
-            if block.iter().fold(0, |most, &length| most.max(length)) < self.min_words {
-                continue;
-            }
-            for (offset, &num_words) in block.iter().enumerate() {
-                if num_words >= self.min_words {
-                    let earlier_column = block_idx * 64 + offset;
-                    self.ends.push(ChainEnd { later_node, earlier_column, num_words });
-                }
+    /// Fills the next row and remembers where long chains end in it.
+    fn extend(&mut self, texts: &Comparison, windows: &[Option<WordWindow>]) {
+        let later_node = self.rows.next_node();
+        if self.rows.push(texts, windows) < self.min_words {
+            return;
+        }
+        for (earlier_column, &num_words) in self.rows.row(later_node).unwrap_or_default().iter().enumerate() {
+            if num_words >= self.min_words {
+                self.ends.push(ChainEnd { later_node, earlier_column, num_words });
             }
         }
     }
@@ -175,8 +212,8 @@ fn is_match(
 }
 
 /// Reads off the longest chain that ends at a pair of nodes, preferring lower levels where chains are equally long.
-fn trace(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Chain {
-    let block = rows_around(texts, max_level, end);
+fn trace(texts: &Comparison, windows: &[Vec<Option<WordWindow>>], max_level: usize, end: &ChainEnd) -> Chain {
+    let block = rows_around(texts, windows, max_level, end);
     let mut pairs = Vec::with_capacity(end.num_words as usize);
     let (mut node, mut column, mut remaining) = (end.later_node, end.earlier_column, end.num_words);
     while remaining > 0 {
@@ -206,7 +243,12 @@ struct Block {
 }
 
 /// Fills rows again around the end of a chain, in a window that grows until it holds a chain of the known length.
-fn rows_around(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Block {
+fn rows_around(
+    texts: &Comparison,
+    windows: &[Vec<Option<WordWindow>>],
+    max_level: usize,
+    end: &ChainEnd,
+) -> Block {
     let mut reach = end.num_words as usize + num_nodes_covered(max_level);
     loop {
         let first_node = end.later_node.saturating_sub(reach);
@@ -219,7 +261,7 @@ fn rows_around(texts: &Comparison, max_level: usize, end: &ChainEnd) -> Block {
         let first_column = columns.start;
         let mut rows = Rows::new(max_level, first_node, columns, reach + 1);
         while rows.next_node() <= end.later_node {
-            rows.push(texts);
+            rows.push(texts, &windows[rows.next_node()]);
         }
         let block = Block { rows, first_column, max_level };
         let is_whole = reach >= texts.later.num_nodes().max(texts.earlier.num_nodes());

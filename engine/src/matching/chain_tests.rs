@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Chain, ChainFinder, MatchingConfig, Relation, find_chains};
+use super::{Chain, ChainFinder, MatchingConfig, Relation, find_chains, find_chains_in};
 use crate::index::{Lattice, WordTolerance, num_nodes_covered};
 use crate::text::{Direction, Word, WordId};
 
@@ -313,6 +313,29 @@ fn words_one_by_one_give_what_the_whole_text_gives() {
         }
         assert_eq!(finder.chains(&text, &text), find_chains(&whole, &whole, Relation::SameRun, &config));
     }
+}
+
+#[test]
+fn texts_in_a_row_have_the_chains_of_each() {
+    let mut rng = ChaCha8Rng::seed_from_u64(10);
+    let config = config(&[2, 3, 4], 5);
+    let mut num_found = 0;
+    for _ in 0..10 {
+        let mut text = |num_words, max_level| {
+            Lattice::from_words(&random_text(&mut rng, num_words, 3, max_level)).unwrap()
+        };
+        let texts = [text(0, 0), text(20, 2), text(0, 0), text(5, 0), text(1, 0), text(30, 1), text(0, 0)];
+        let later = text(25, 2);
+        let mut expected = Vec::new();
+        for (text_idx, earlier) in texts.iter().enumerate() {
+            let chains = find_chains(earlier, &later, Relation::DifferentRuns, &config);
+            expected.extend(chains.into_iter().map(|chain| (text_idx, chain)));
+        }
+        num_found += expected.len();
+        assert_eq!(find_chains_in(&texts.each_ref(), &later, &config), expected);
+    }
+    assert!(num_found > 100, "{num_found} chains test little");
+    assert!(find_chains_in(&[], &Lattice::default(), &config).is_empty());
 }
 
 #[test]

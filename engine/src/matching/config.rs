@@ -14,6 +14,10 @@ pub struct MatchingConfig {
     /// Words a chain needs, by the highest level of words it may use: entry l is for levels 0 to l, and the number of
     /// entries is the number of levels searched (7, 10, 13 by SPEC 3.10).
     pub min_chain_words: Vec<u16>,
+    /// Fewest words of a chain that the automatic threshold looks at.
+    pub min_surprising_words: u16,
+    /// Largest E-value of an automatically accepted chain: as many false ones are expected per run and direction.
+    pub max_chance_matches: f64,
     /// Observations that must lie between two matched words of one run (SPEC 3.10); 100 are 10 m of travel.
     pub min_gap_observations: u32,
     /// δ_max: farthest shift tried when matched words are aligned by density, in observations (Eq 5.3).
@@ -27,6 +31,8 @@ impl Default for MatchingConfig {
         Self {
             tolerance: WordTolerance::default(),
             min_chain_words: vec![7, 10, 13],
+            min_surprising_words: 3,
+            max_chance_matches: 0.1,
             min_gap_observations: 100,
             alignment_reach_observations: 15,
             node_spacing_observations: 5,
@@ -43,6 +49,12 @@ impl MatchingConfig {
         self.tolerance.validate(&format!("{path}.tolerance"))?;
         if self.min_chain_words.is_empty() || self.min_chain_words.len() > 8 {
             return Err(ConfigError::new(format!("{path}.min_chain_words"), "needs one to eight entries"));
+        }
+        if self.min_surprising_words == 0 {
+            return Err(ConfigError::new(format!("{path}.min_surprising_words"), "must be at least 1"));
+        }
+        if !(self.max_chance_matches > 0.0 && self.max_chance_matches.is_finite()) {
+            return Err(ConfigError::new(format!("{path}.max_chance_matches"), "must be positive"));
         }
         if self.min_chain_words.contains(&0) {
             return Err(ConfigError::new(format!("{path}.min_chain_words"), "a chain has at least one word"));

@@ -4,12 +4,16 @@ mod alignment;
 mod chain;
 mod claim;
 mod config;
+mod evidence;
 mod rows;
+mod run_match;
 
 #[cfg(test)]
 mod chain_tests;
 
 pub use alignment::{Alignment, align_words};
-pub use chain::{Chain, ChainFinder, Relation, find_chains};
+pub use chain::{Chain, ChainFinder, Relation, find_chains, find_chains_in};
 pub use claim::{ObservationPair, aligned_nodes, chain_stretches, claimed_pairs};
 pub use config::MatchingConfig;
+pub use evidence::{ChainEvidence, TextStatistics};
+pub use run_match::{RunMatch, match_run};

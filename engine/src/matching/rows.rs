@@ -13,7 +13,7 @@
 use std::collections::VecDeque;
 use std::ops::Range;
 
-use crate::index::{Lattice, LevelColumns, WordTolerance, WordWindow, num_nodes_covered};
+use crate::index::{Lattice, LevelColumns, Syllables, WordTolerance, WordWindow, num_nodes_covered};
 use crate::text::Direction;
 
 /// What a dynamic programme compares.
@@ -48,6 +48,11 @@ impl Comparison<'_> {
             Direction::Opposite => word.reversed(),
         };
         Some(self.tolerance.window(&as_read))
+    }
+
+    /// What matches the later text's words that end at `node`, level by level.
+    pub fn windows(&self, node: usize, max_level: usize) -> Vec<Option<WordWindow>> {
+        (0..=max_level).map(|level| self.window(node, level)).collect()
     }
 
     /// The node at which the earlier text's word of `level` ends whose column is `column`.
@@ -132,31 +137,35 @@ impl Rows {
         self.padded_row(node).map(|row| &row[padding..padding + self.num_columns])
     }
 
-    /// Fills the row of the next node.
-    pub fn push(&mut self, texts: &Comparison) {
+    /// Fills the row of the next node, given what matches the words that end there ([`Comparison::windows`]); returns
+    /// the longest chain in it.
+    pub fn push(&mut self, texts: &Comparison, windows: &[Option<WordWindow>]) -> i16 {
         let node = self.next_node;
+        let mut longest = 0;
         let mut row = if self.rows.len() >= self.num_kept { self.rows.pop_front() } else { None }
             .unwrap_or_else(|| self.blank.clone());
         row.fill(0);
-        for later_level in 0..=self.max_level {
-            let Some(window) = texts.window(node, later_level) else { continue };
+        for (later_level, window) in windows.iter().take(self.max_level + 1).enumerate() {
+            let Some(window) = window else { continue };
             let covered = num_nodes_covered(later_level);
             let num_allowed = texts.num_allowed_nodes(node + 1 - covered);
             let previous = node.checked_sub(covered).and_then(|previous| self.padded_row(previous));
             let previous = previous.unwrap_or(&self.blank);
             for earlier_level in 0..=self.max_level {
                 let Some(words) = texts.earlier.level(earlier_level) else { continue };
-                self.extend_by(
+                let longest_here = self.extend_by(
                     texts.direction,
                     (words, earlier_level),
-                    &window,
+                    window,
                     num_allowed,
                     (previous, &mut row),
                 );
+                longest = longest_here.max(longest);
             }
         }
         self.rows.push_back(row);
         self.next_node += 1;
+        longest
     }
 
     fn padding(&self) -> usize {
@@ -168,7 +177,8 @@ impl Rows {
         self.rows.len().checked_sub(age + 1).map(|position| &self.rows[position])
     }
 
-    /// Lets one word of the later text extend all chains by words of one level of the earlier text.
+    /// Lets one word of the later text extend all chains by words of one level of the earlier text; returns the
+    /// longest chain in the row.
     fn extend_by(
         &self,
         direction: Direction,
@@ -176,47 +186,89 @@ impl Rows {
         window: &WordWindow,
         num_allowed: usize,
         (previous, row): (&[i16], &mut [i16]),
-    ) {
+    ) -> i16 {
         let covered = num_nodes_covered(level);
         let end_of_first = match direction {
             Direction::Same => self.first_column,
             Direction::Opposite => self.first_column + covered - 1,
         };
         let end_of_last = (end_of_first + self.num_columns).min(num_allowed);
-        let Some(length) = end_of_last.checked_sub(end_of_first) else { return };
+        let Some(length) = end_of_last.checked_sub(end_of_first) else { return 0 };
         let padding = self.padding();
         let previous_start = match direction {
             Direction::Same => padding - covered,
             Direction::Opposite => padding + covered,
         };
-        extend_chains(
-            &mut row[padding..padding + length],
-            &previous[previous_start..previous_start + length],
-            (
-                &words.class[end_of_first..end_of_last],
-                &words.size[end_of_first..end_of_last],
-                &words.turn[end_of_first..end_of_last],
-            ),
-            window,
-        );
+        let row = &mut row[padding..padding + length];
+        let previous = &previous[previous_start..previous_start + length];
+        if level == 0 {
+            let words = words.by_node.slice(end_of_first..end_of_last);
+            return extend_chains(row, previous, words, window);
+        }
+        // Alternative words end at few nodes.
+        let first_word = words.ends.partition_point(|&end| (end as usize) < end_of_first);
+        let last_word = words.ends.partition_point(|&end| (end as usize) < end_of_last);
+        let ends = &words.ends[first_word..last_word];
+        let mut longest = 0;
+        let (class, size, turn) = words.in_row.slice(first_word..last_word);
+        for (((&end, &class), &size), &turn) in ends.iter().zip(class).zip(size).zip(turn) {
+            if class == window.class && window.contains(&Syllables { class, size, turn }) {
+                let column = end as usize - end_of_first;
+                row[column] = previous[column].saturating_add(1).max(row[column]);
+                longest = row[column].max(longest);
+            }
+        }
+        longest
     }
 }
 
-/// One word against a column of words: where they match, a chain grows by one.
+/// Classes, sizes and turns of words.
+type Columns<'a> = (&'a [u16], &'a [u16], &'a [i16]);
+
+/// Words compared at once: two vector registers of every processor that this is built for.
+const LANES: usize = 16;
+
+/// One word against a column of words: where they match, a chain grows by one. All slices have the same length.
+/// Returns the longest chain in the row.
 ///
-/// All slices have the same length; the loop has no branch and no call, so that it compiles to vector code.
+/// Kept out of its caller, whose variables would take the registers that the window should stay in.
+#[inline(never)]
 fn extend_chains(
     row: &mut [i16],
     previous: &[i16],
-    (class, size, turn): (&[u16], &[u16], &[i16]),
+    (class, size, turn): Columns,
     window: &WordWindow,
-) {
-    let words = class.iter().zip(size).zip(turn);
-    for ((length, &before), ((&class, &size), &turn)) in row.iter_mut().zip(previous).zip(words) {
-        let is_match = (class == window.class)
-            & (size.wrapping_sub(window.size_min) <= window.size_span)
-            & ((turn.wrapping_sub(window.turn_min) as u16) <= window.turn_span);
-        let extended = if is_match { before.saturating_add(1) } else { 0 };
-        *length = extended.max(*length);
+) -> i16 {
+    let mut longest = [0; LANES];
+    let (rows, row_rest) = row.as_chunks_mut::<LANES>();
+    let (befores, before_rest) = previous.as_chunks::<LANES>();
+    let (classes, class_rest) = class.as_chunks::<LANES>();
+    let (sizes, size_rest) = size.as_chunks::<LANES>();
+    let (turns, turn_rest) = turn.as_chunks::<LANES>();
+    let words = classes.iter().zip(sizes).zip(turns);
+    for ((row, before), ((class, size), turn)) in rows.iter_mut().zip(befores).zip(words) {
+        for lane in 0..LANES {
+            row[lane] = extended(row[lane], before[lane], (class[lane], size[lane], turn[lane]), window);
+            longest[lane] = row[lane].max(longest[lane]);
+        }
     }
+    let words = class_rest.iter().zip(size_rest).zip(turn_rest);
+    for ((length, &before), ((&class, &size), &turn)) in row_rest.iter_mut().zip(before_rest).zip(words) {
+        *length = extended(*length, before, (class, size, turn), window);
+        longest[0] = longest[0].max(*length);
+    }
+    longest.into_iter().fold(0, i16::max)
+}
+
+/// The chain length at a pair of words: that before it and one more where the words match, if that is longer.
+///
+/// Arithmetic on masks instead of conditions, because a condition would be compiled to a jump and the loop around it
+/// would no longer be vector code.
+#[inline(always)]
+fn extended(length: i16, before: i16, (class, size, turn): (u16, u16, i16), window: &WordWindow) -> i16 {
+    let off_class = class ^ window.class;
+    let off_size = size.wrapping_sub(window.size_min).saturating_sub(window.size_span);
+    let off_turn = (turn.wrapping_sub(window.turn_min) as u16).saturating_sub(window.turn_span);
+    let mask = -i16::from(off_class | off_size | off_turn == 0);
+    (before.saturating_add(1) & mask).max(length)
 }

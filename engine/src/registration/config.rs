@@ -113,6 +113,9 @@ impl OdometryNoise {
     }
 }
 
+/// Points of the refiner's window are kept with 16 bits a coordinate, 2 mm each.
+const RANGE_LIMIT_MAX_M: f64 = 65.0;
+
 /// Settings of [`OdometryRefiner`](super::OdometryRefiner).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -242,6 +245,10 @@ impl RefinerConfig {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
             }
+        }
+        if self.range_limit_m > RANGE_LIMIT_MAX_M {
+            let problem = format!("must be at most {RANGE_LIMIT_MAX_M}");
+            return Err(ConfigError::new(format!("{path}.range_limit_m"), problem));
         }
         Ok(())
     }

@@ -29,11 +29,39 @@ pub struct KeyframeMotion {
     pub motion_covariance: [[f64; 3]; 3],
 }
 
-/// A scan that still belongs to the window, as points of the run's frame in millimetres.
+/// Grain of the points of the window: with 16 bits a coordinate they reach 65 m from the robot, beyond any range limit.
+const POINT_GRAIN_M: f64 = 0.002;
+
+/// A scan that still belongs to the window: points in the axes of the run, in grains from where the robot was.
+///
+/// Everything that is computed from a point uses it as rounded here, so that what is added to the surfaces can be taken
+/// away again exactly, by this process or the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct RecentScan {
     travel_mm: u64,
-    points_mm: Vec<(i32, i32)>,
+    robot_grains: (i32, i32),
+    offsets: Box<[(i16, i16)]>,
+}
+
+impl RecentScan {
+    fn new(travel_mm: u64, run_from_robot: &Pose2, points: &[Point2]) -> Self {
+        let grains = |metres: f64| (metres / POINT_GRAIN_M).round() as i32;
+        let robot_grains = (grains(run_from_robot.x), grains(run_from_robot.y));
+        let offset = |point: Point2| {
+            let along =
+                |metres: f64, robot: i32| grains(metres).saturating_sub(robot).clamp(-32_768, 32_767) as i16;
+            (along(point.x, robot_grains.0), along(point.y, robot_grains.1))
+        };
+        let offsets = transformed(points, run_from_robot).into_iter().map(offset).collect();
+        Self { travel_mm, robot_grains, offsets }
+    }
+
+    /// The points in the run's frame, metres.
+    fn points(&self) -> impl Iterator<Item = Point2> + '_ {
+        let metres = |robot: i32, offset: i16| f64::from(robot.saturating_add(offset.into())) * POINT_GRAIN_M;
+        let (x, y) = self.robot_grains;
+        self.offsets.iter().map(move |&(dx, dy)| Point2::new(metres(x, dx), metres(y, dy)))
+    }
 }
 
 /// Poses of the last registered scan.
@@ -64,8 +92,8 @@ impl From<RefinerState> for OdometryRefiner {
     fn from(state: RefinerState) -> Self {
         let mut surfaces = SurfaceMap::new(state.config.cell_m);
         for scan in &state.recent {
-            for point in &scan.points_mm {
-                surfaces.insert(&from_millimetres(*point));
+            for point in scan.points() {
+                surfaces.insert(&point);
             }
         }
         Self { state, surfaces }
@@ -175,8 +203,8 @@ impl OdometryRefiner {
         let mut grid =
             LikelihoodGrid::around(&predicted.position(), config.search_radius_m, config.search_cell_m);
         for scan in &self.state.recent {
-            for point in &scan.points_mm {
-                grid.mark(&from_millimetres(*point));
+            for point in scan.points() {
+                grid.mark(&point);
             }
         }
         let window = LocalWindow {
@@ -188,19 +216,19 @@ impl OdometryRefiner {
     }
 
     fn keep(&mut self, points: &[Point2], run_from_robot: Pose2, odom_from_robot: Pose2) {
-        let points_mm: Vec<_> = transformed(points, &run_from_robot).iter().map(to_millimetres).collect();
-        for point in &points_mm {
-            self.surfaces.insert(&from_millimetres(*point));
+        let scan = RecentScan::new(self.state.travel_mm, &run_from_robot, points);
+        for point in scan.points() {
+            self.surfaces.insert(&point);
         }
-        self.state.recent.push_back(RecentScan { travel_mm: self.state.travel_mm, points_mm });
+        self.state.recent.push_back(scan);
         self.state.anchor = Some(Anchor { odom_from_robot, run_from_robot });
         let window_mm = (self.state.config.window_m * 1000.0) as u64;
         while self.state.recent.len() > self.state.config.max_scans
             || self.state.recent.front().is_some_and(|scan| scan.travel_mm + window_mm < self.state.travel_mm)
         {
             let Some(old) = self.state.recent.pop_front() else { break };
-            for point in &old.points_mm {
-                self.surfaces.remove(&from_millimetres(*point));
+            for point in old.points() {
+                self.surfaces.remove(&point);
             }
         }
     }
@@ -211,14 +239,6 @@ pub(crate) fn rotated(covariance: &Matrix3<f64>, angle_rad: f64) -> Matrix3<f64>
     let (sin, cos) = angle_rad.sin_cos();
     let turn = Matrix3::new(cos, -sin, 0.0, sin, cos, 0.0, 0.0, 0.0, 1.0);
     turn * covariance * turn.transpose()
-}
-
-fn to_millimetres(point: &Point2) -> (i32, i32) {
-    ((point.x * 1000.0).round() as i32, (point.y * 1000.0).round() as i32)
-}
-
-fn from_millimetres(point: (i32, i32)) -> Point2 {
-    Point2::new(f64::from(point.0) * 1e-3, f64::from(point.1) * 1e-3)
 }
 
 #[cfg(test)]

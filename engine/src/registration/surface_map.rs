@@ -12,6 +12,14 @@ use crate::geometry::Point2;
 /// A cell by its integer coordinates.
 type Cell = (i32, i32);
 
+/// A cell as it is looked up, by the low bits of its coordinates: surfaces that are kept together span far less than
+/// the 2¹⁶ cells after which those repeat.
+type CellKey = (i16, i16);
+
+fn key(cell: Cell) -> CellKey {
+    (cell.0 as i16, cell.1 as i16)
+}
+
 /// Mixes the two coordinates of a cell; fixed, so that nothing depends on the process.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CellHasher(u64);
@@ -23,11 +31,11 @@ impl Hasher for CellHasher {
 
     fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            self.write_i32(i32::from(byte));
+            self.write_i16(i16::from(byte));
         }
     }
 
-    fn write_i32(&mut self, value: i32) {
+    fn write_i16(&mut self, value: i16) {
         self.0 =
             (self.0.rotate_left(23) ^ u64::from(value.cast_unsigned())).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     }
@@ -61,7 +69,7 @@ pub(crate) struct Surface {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SurfaceMap {
     cell_m: f64,
-    cells: HashMap<Cell, Moments, BuildHasherDefault<CellHasher>>,
+    cells: HashMap<CellKey, Moments, BuildHasherDefault<CellHasher>>,
 }
 
 impl SurfaceMap {
@@ -73,7 +81,7 @@ impl SurfaceMap {
     /// Adds a point.
     pub fn insert(&mut self, point: &Point2) {
         let (cell, x, y) = self.locate(point);
-        let moments = self.cells.entry(cell).or_default();
+        let moments = self.cells.entry(key(cell)).or_default();
         moments.count += 1;
         moments.x += x;
         moments.y += y;
@@ -85,7 +93,7 @@ impl SurfaceMap {
     /// Takes a point away that was added before.
     pub fn remove(&mut self, point: &Point2) {
         let (cell, x, y) = self.locate(point);
-        if let Some(moments) = self.cells.get_mut(&cell) {
+        if let Some(moments) = self.cells.get_mut(&key(cell)) {
             moments.count -= 1;
             moments.x -= x;
             moments.y -= y;
@@ -93,7 +101,7 @@ impl SurfaceMap {
             moments.xy -= x * y;
             moments.yy -= y * y;
             if moments.count == 0 {
-                self.cells.remove(&cell);
+                self.cells.remove(&key(cell));
             }
         }
     }
@@ -106,7 +114,7 @@ impl SurfaceMap {
         let mut sum = [0.0f64; 6];
         for dy in -1..=1i32 {
             for dx in -1..=1i32 {
-                let Some(m) = self.cells.get(&(column + dx, row + dy)) else { continue };
+                let Some(m) = self.cells.get(&key((column + dx, row + dy))) else { continue };
                 let n = f64::from(m.count);
                 let (ox, oy) = (f64::from(dx) * step, f64::from(dy) * step);
                 let (sx, sy) = (f64::from(m.x), f64::from(m.y));

@@ -17,8 +17,8 @@ pub struct KeyframePose {
     pub odom_from_robot: Pose2,
     /// Pose in the run's frame.
     pub run_from_robot: Pose2,
-    /// Covariance of the motion since the previous keyframe, (x, y, θ) in that keyframe's axes, row by row; that of
-    /// the smallest motion for the first.
+    /// Covariance of the motion since the previous keyframe, (x, y, θ) in that keyframe's axes, row by row; the first
+    /// keyframe of a run has no motion to speak of.
     pub motion_covariance: [[f64; 3]; 3],
 }
 

@@ -92,11 +92,15 @@ impl<'a> BlockEvidence<'a> {
         let radius_m = self.config.driven_radius_m;
         let resolution_m = self.config.resolution_m;
         let reach = (radius_m / resolution_m).ceil() as i64;
-        for row in -reach..=reach {
-            for column in -reach..=reach {
-                let (dx, dy) = (column as f64 * resolution_m, row as f64 * resolution_m);
-                let Some(index) = self.index(position.x + dx, position.y + dy) else { continue };
-                self.is_driven[index] |= dx.hypot(dy) <= radius_m;
+        // Whole cells around the robot's own: adding metres would skip a row of cells when it stands on a border.
+        let cell = |metres: f64| (metres / resolution_m + BORDER_SHARE).floor() as i64;
+        let (column, row) = (cell(position.x - self.lower_left.x), cell(position.y - self.lower_left.y));
+        let side = self.side as i64;
+        for (up, right) in (-reach..=reach).flat_map(|up| (-reach..=reach).map(move |right| (up, right))) {
+            let (x, y) = (column + right, row + up);
+            let is_near = (right as f64).hypot(up as f64) * resolution_m <= radius_m + BORDER_SHARE;
+            if is_near && (0..side).contains(&x) && (0..side).contains(&y) {
+                self.is_driven[(y * side + x) as usize] = true;
             }
         }
     }
@@ -123,7 +127,6 @@ impl<'a> BlockEvidence<'a> {
             resolution_m: config.resolution_m,
             lower_left: self.lower_left,
             side: self.side,
-
             clearance_m,
             is_driven: self.is_driven,
         }
@@ -157,9 +160,12 @@ impl Block {
     }
 }
 
+/// Share of a cell by which a point short of a cell's border stands on it: sums of metres round either way.
+const BORDER_SHARE: f64 = 1e-6;
+
 fn cell_index(x: f64, y: f64, lower_left: &Point2, resolution_m: f64, side: usize) -> Option<usize> {
-    let column = ((x - lower_left.x) / resolution_m).floor();
-    let row = ((y - lower_left.y) / resolution_m).floor();
+    let column = ((x - lower_left.x) / resolution_m + BORDER_SHARE).floor();
+    let row = ((y - lower_left.y) / resolution_m + BORDER_SHARE).floor();
     let is_inside = column >= 0.0 && row >= 0.0 && column < side as f64 && row < side as f64;
     is_inside.then(|| row as usize * side + column as usize)
 }

@@ -23,6 +23,8 @@ mod route;
 mod rules;
 mod segmentation;
 mod signature;
+#[cfg(test)]
+mod tests;
 
 pub use config::SemanticsConfig;
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};

@@ -10,15 +10,15 @@ use crate::geometry::Pose2;
 /// travel ago; every field describes that earlier moment, so nothing downstream needs to know of the delay.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
-    /// Sequence number in the run of the scan taken at this place.
+    /// Sequence number in the run of the scan taken nearest to this place.
     pub scan_seq: u64,
     /// Timestamp of that scan, nanoseconds.
     pub timestamp_ns: i64,
     /// Distance driven since the run began, by odometry, metres.
     pub travel_m: f64,
-    /// Raw odometry pose.
+    /// Raw odometry pose, interpolated between the scans before and after.
     pub odom_from_robot: Pose2,
-    /// Pose in the run's own frame: odometry as sent, or refined against the recent scans.
+    /// Pose in the run's own frame, interpolated likewise: odometry as sent, or refined against the recent scans.
     pub run_from_robot: Pose2,
     /// Soft density of each configured kernel, in [0, 1] (Algorithm 3.1).
     pub densities: Vec<f32>,

@@ -7,9 +7,8 @@ use std::time::{Duration, Instant};
 use locution_engine::config::EngineConfig;
 use locution_engine::mapping::{
     Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
-    SiteMap, map_site,
+    SiteMap, map_site, weigh_texts,
 };
-use locution_engine::semantics::SemanticsConfig;
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
@@ -157,10 +156,11 @@ async fn map_runs(
     let (memo, outcome) = on_blocking_thread(move || {
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
         let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
+            weigh_texts(&records, &mut map, &config.matching);
             keep_vetoed_visible(&mut map, &decisions);
             let refused = std::mem::take(&mut map.refused);
             map.matches.extend(refused);
-            let labels = label_map(&records, &map, &SemanticsConfig::default());
+            let labels = label_map(&records, &map, &config.semantics);
             (map, labels)
         });
         (memo, outcome)

@@ -42,6 +42,7 @@ mod runs;
 mod scans;
 mod series;
 mod site;
+mod site_texts;
 mod trajectory;
 mod translation;
 pub mod word_queries;

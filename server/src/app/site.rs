@@ -12,6 +12,7 @@ use locution_engine::text::Quantizer;
 use super::jobs::Jobs;
 use super::records::{RunHead, SiteRecord, TextHead};
 use super::run_writer::RunWriter;
+use super::site_texts::SiteTexts;
 use super::{App, AppError, Name};
 use crate::storage::keys::{Generation, Key};
 use crate::storage::{Batch, Precondition, SiteStore, StorageError, codec};
@@ -31,6 +32,7 @@ pub struct Site {
     pub(super) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
     pub(super) memo: Mutex<RegistrationMemo>,
+    pub(super) texts: SiteTexts,
 }
 
 /// The site's record as last read or written.
@@ -180,6 +182,16 @@ impl Site {
     }
 }
 
+/// Indexes the texts of a site in the background, so that the first question need not wait for it.
+fn index_texts(site: &Arc<Site>) {
+    let site = Arc::clone(site);
+    tokio::spawn(async move {
+        if let Err(error) = site.text_segments().await {
+            tracing::warn!(site = %site.name(), %error, "the texts cannot be indexed");
+        }
+    });
+}
+
 fn decode_all<T: serde::de::DeserializeOwned>(values: &[Option<Bytes>]) -> Result<Vec<T>, StorageError> {
     values.iter().flatten().map(|bytes| codec::decode(bytes, "the head of a run")).collect()
 }
@@ -261,10 +273,12 @@ impl App {
             jobs: Jobs::default(),
             build_requests: AtomicU64::new(0),
             memo: Mutex::default(),
+            texts: SiteTexts::default(),
         });
         site.load_jobs().await?;
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
         self.work_on(&site);
+        index_texts(&site);
         Ok(site)
     }
 

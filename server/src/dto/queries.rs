@@ -77,11 +77,13 @@ impl WordQueryDto {
 /// Where a question fits.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct WordAnswerDto {
+    /// The site.
+    pub site: String,
     /// The run.
     pub run: String,
     /// `same`: read forwards; `opposite`: backwards.
     pub direction: String,
-    /// First and last word of level 0.
+    /// First and last word of level 0; alternative words make them more than the question has.
     pub words: [u32; 2],
     /// First and last observation.
     pub observations: [u32; 2],
@@ -93,13 +95,15 @@ pub struct WordAnswerDto {
     pub map_from_middle: Option<PoseDto>,
 }
 
-impl From<WordAnswer> for WordAnswerDto {
-    fn from(answer: WordAnswer) -> Self {
+impl WordAnswerDto {
+    /// An answer of a site as it is sent.
+    pub fn new(site: &str, answer: WordAnswer) -> Self {
         let direction = match answer.direction {
             Direction::Same => "same",
             Direction::Opposite => "opposite",
         };
         Self {
+            site: site.to_owned(),
             run: answer.run,
             direction: direction.into(),
             words: [answer.words.0, answer.words.1],

@@ -35,6 +35,8 @@ pub enum Key {
     Words(Generation, RunIdx, u8, u64),
     /// Up to 64 keyframes beginning with a number.
     Keyframes(Generation, RunIdx, u64),
+    /// The text of a finished run, packed, in parts of less than one mebibyte.
+    PackedText(Generation, RunIdx, u32),
     /// What a map version is.
     Map(MapVersion),
     /// One part of a map version: which kind, and its number within.
@@ -70,6 +72,9 @@ impl Key {
             }
             Key::Keyframes(generation, run, first) => {
                 Writer::new(0x14).u32(*generation).u32(*run).u64(*first).done()
+            }
+            Key::PackedText(generation, run, part) => {
+                Writer::new(0x15).u32(*generation).u32(*run).u32(*part).done()
             }
             Key::Map(version) => Writer::new(0x20).u64(*version).done(),
             Key::MapPart(version, kind, part) => Writer::new(0x21).u64(*version).u8(*kind).u64(*part).done(),
@@ -110,9 +115,19 @@ impl Key {
         Writer::new(0x14).u32(generation).u32(run).done()
     }
 
+    /// The prefix of all packed texts of a generation.
+    pub fn all_packed_texts(generation: Generation) -> Vec<u8> {
+        Writer::new(0x15).u32(generation).done()
+    }
+
+    /// The run that a packed text's key names.
+    pub fn run_of_packed_text(key: &[u8]) -> Option<RunIdx> {
+        key.get(5..)?.first_chunk().map(|bytes| u32::from_be_bytes(*bytes))
+    }
+
     /// The prefixes of everything that belongs to a text generation.
     pub fn all_of_generation(generation: Generation) -> Vec<Vec<u8>> {
-        (0x10..=0x14).map(|tag| Writer::new(tag).u32(generation).done()).collect()
+        (0x10..=0x15).map(|tag| Writer::new(tag).u32(generation).done()).collect()
     }
 
     /// The prefix of all parts of one kind of a map version.
@@ -203,6 +218,7 @@ mod tests {
             any::<(u32, u32, u64)>().prop_map(|(g, run, first)| Key::Observations(g, run, first)),
             any::<(u32, u32, u8, u64)>().prop_map(|(g, run, level, first)| Key::Words(g, run, level, first)),
             any::<(u32, u32, u64)>().prop_map(|(g, run, first)| Key::Keyframes(g, run, first)),
+            any::<(u32, u32, u32)>().prop_map(|(g, run, part)| Key::PackedText(g, run, part)),
             any::<(u64, u8, u64)>().prop_map(|(v, kind, part)| Key::MapPart(v, kind, part)),
             any::<(u64, u64)>().prop_map(|(v, number)| Key::Match(v, number)),
             any::<u64>().prop_map(Key::Decision),
@@ -222,6 +238,7 @@ mod tests {
         assert!(Key::Scans(7, 9).encode().starts_with(&Key::all_scans(7)));
         assert!(!Key::Scans(8, 9).encode().starts_with(&Key::all_scans(7)));
         assert!(Key::Words(1, 2, 3, 4).encode().starts_with(&Key::all_words(1, 2, 3)));
+        assert_eq!(Key::run_of_packed_text(&Key::PackedText(1, 7, 2).encode()), Some(7));
         assert_eq!(Key::last_u64(&Key::Scans(7, 9).encode()), Some(9));
     }
 }
