@@ -12,8 +12,9 @@ use super::joining::{Hypothesis, JoinReport, hypotheses, judge_join, registered_
 use super::judgements::Judgements;
 use super::memo::RegistrationMemo;
 use super::overlap::{overlap, own_opinions};
-use super::place_match::{Channel, Decision, RejectionReason};
+use super::place_match::{Channel, Decision, PlaceMatch, RejectionReason};
 use super::placement::place_observations;
+use super::refused::refused_matches;
 use super::run::RunRecord;
 use super::site_map::{MappedRun, SiteMap};
 use super::stretches::{StretchSettings, find_stretches};
@@ -53,6 +54,8 @@ struct Mapper<'a> {
     judgements: &'a Judgements<'a>,
     draft: Draft,
     has_joined: bool,
+    /// Candidates whose submaps do not fit.
+    unfit: Vec<PlaceMatch>,
 }
 
 /// What changes while the map is being built.
@@ -91,7 +94,7 @@ impl<'a> Mapper<'a> {
         graph.optimise(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
         let draft = Draft { components, graph, closures: Vec::new(), tried: Vec::new(), refused: Vec::new() };
-        Ok(Self { config, runs, set, judgements, draft, has_joined: false })
+        Ok(Self { config, runs, set, judgements, draft, has_joined: false, unfit: Vec::new() })
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
@@ -129,8 +132,9 @@ impl<'a> Mapper<'a> {
             .into_iter()
             .filter(|candidate| !self.judgements.forbid(candidate.earlier, candidate.later))
             .collect();
-        let registered: Vec<Closure> =
-            registered_candidates(&across, self.set, self.config, memo).into_iter().flatten().collect();
+        let registered = registered_candidates(&across, self.set, self.config, memo);
+        self.unfit = refused_matches(&across, &registered);
+        let registered: Vec<Closure> = registered.into_iter().flatten().collect();
         let mut refusals: BTreeMap<(u32, u32), RejectionReason> = BTreeMap::new();
         let mut proposals = self.proposals(&registered, &|_, _| true)?;
         while let Some(rivals) = proposals.pop() {
@@ -320,7 +324,7 @@ impl<'a> Mapper<'a> {
             self.judgements.settle(&mut refused);
             refused
         };
-        let refused = self.draft.refused.iter().map(as_match).collect();
+        let refused = self.draft.refused.iter().map(as_match).chain(self.unfit).collect();
         SiteMap { matches, refused, runs, num_components }
     }
 }

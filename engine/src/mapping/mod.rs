@@ -15,6 +15,7 @@ mod occupancy;
 mod overlap;
 mod place_match;
 mod placement;
+mod refused;
 mod run;
 mod site_map;
 mod stretches;

@@ -27,7 +27,7 @@ const CORRELATION_MIN: f64 = 0.5;
 /// Places that the map puts farther apart are different ones, metres.
 const APART_MIN_M: f64 = 3.0;
 
-/// Adds bits, E-value and shape to every match of a map, and the claims of the text that the map does not share.
+/// Adds bits, E-value and shape to every match of a map and every refused candidate, and the claims of the text that the map does not share.
 ///
 /// Runs, map and texts must belong together.
 pub fn weigh_texts(runs: &[RunRecord<'_>], map: &mut SiteMap, config: &MatchingConfig) {
@@ -41,7 +41,7 @@ pub fn weigh_texts(runs: &[RunRecord<'_>], map: &mut SiteMap, config: &MatchingC
     chains.sort_by(surprise);
     let site = Site { runs, texts: &texts, statistics: &statistics, tolerance: config.tolerance };
     let index = index_of(&chains);
-    for found in &mut map.matches {
+    for found in map.matches.iter_mut().chain(&mut map.refused) {
         site.weigh(found, &index);
     }
     let claims = site.claims(&chains, map, config.max_chance_matches);
@@ -381,7 +381,7 @@ mod tests {
         let map_from_keyframes = keyframes.iter().enumerate().map(shifted).collect();
         let elsewhere = MappedRun { component: 1, ..MappedRun::default() };
         let runs = vec![MappedRun { component: 0, map_from_keyframes }, elsewhere];
-        let mut map = SiteMap { matches, runs, num_components: 2 };
+        let mut map = SiteMap { matches, runs, num_components: 2, ..SiteMap::default() };
         weigh_texts(&[record, other], &mut map, &MatchingConfig::default());
         map
     }

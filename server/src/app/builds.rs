@@ -157,9 +157,8 @@ async fn map_runs(
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
         let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
             weigh_texts(&records, &mut map, &config.matching);
+            map.matches.append(&mut map.refused);
             keep_vetoed_visible(&mut map, &decisions);
-            let refused = std::mem::take(&mut map.refused);
-            map.matches.extend(refused);
             let labels = label_map(&records, &map, &config.semantics);
             (map, labels)
         });
