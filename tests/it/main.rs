@@ -4,7 +4,6 @@
 mod access;
 mod bad_input;
 mod batches;
-mod changes;
 mod crash;
 mod maps;
 mod sites;
