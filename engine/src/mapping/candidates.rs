@@ -23,28 +23,55 @@ pub(crate) struct Candidate {
     pub profile: ProfileCandidate,
 }
 
-/// Profile candidates of all runs, at most one for a pair of anchors and a direction, in order of anchors.
-pub(crate) fn profile_candidates(
+/// Profile candidates between different runs, at most one for a pair of anchors and a direction, in order of anchors.
+///
+/// Every two runs are compared on their own: among the runs of many buildings those of other buildings would take the
+/// few places that each window has to give. Of every two runs the best `max_candidates_per_pair` are kept.
+pub(crate) fn candidates_across(
     runs: &[RunRecord<'_>],
     set: &AnchorSet,
     config: &MappingConfig,
 ) -> Vec<Candidate> {
     let spacing_m = config.retrieval.sample_spacing_m;
-    let profiles =
+    let profiles: Vec<RunProfile> =
         runs.iter().map(|run| RunProfile::from_observations(run.observations, spacing_m)).collect();
-    let index = ProfileIndex::build(profiles, config.retrieval.clone());
-    let mut best: BTreeMap<(usize, usize, Direction), Candidate> = BTreeMap::new();
-    for run_idx in 0..runs.len() {
-        for profile in index.all_candidates(run_idx) {
-            let Some(candidate) = to_anchors(runs, set, profile) else { continue };
-            let key = (candidate.later, candidate.earlier, candidate.profile.direction);
-            let is_better = best.get(&key).is_none_or(|other| candidate.profile.score > other.profile.score);
-            if is_better {
-                best.insert(key, candidate);
-            }
+    let mut found = Vec::new();
+    for later_run in 0..runs.len() {
+        for earlier_run in 0..later_run {
+            let pair = vec![profiles[earlier_run].clone(), profiles[later_run].clone()];
+            let index = ProfileIndex::build(pair, config.retrieval.clone());
+            let across = index.all_candidates(1).into_iter().filter(|found| found.earlier.run_idx == 0);
+            let named = across.filter_map(|mut profile| {
+                profile.earlier.run_idx = earlier_run as u32;
+                profile.later.run_idx = later_run as u32;
+                to_anchors(runs, set, profile)
+            });
+            found.extend(best_of_pair(named, config.max_candidates_per_pair));
         }
     }
-    best.into_values().collect()
+    found.sort_by_key(Candidate::key);
+    found
+}
+
+impl Candidate {
+    fn key(&self) -> (usize, usize, Direction) {
+        (self.later, self.earlier, self.profile.direction)
+    }
+}
+
+/// The best candidate of every two anchors and direction, and of these the best few.
+fn best_of_pair(candidates: impl Iterator<Item = Candidate>, num_max: usize) -> Vec<Candidate> {
+    let mut best: BTreeMap<(usize, usize, Direction), Candidate> = BTreeMap::new();
+    for candidate in candidates {
+        let key = candidate.key();
+        if best.get(&key).is_none_or(|other| candidate.profile.score > other.profile.score) {
+            best.insert(key, candidate);
+        }
+    }
+    let mut ranked: Vec<Candidate> = best.into_values().collect();
+    ranked.sort_by(|a, b| b.profile.score.total_cmp(&a.profile.score).then(a.key().cmp(&b.key())));
+    ranked.truncate(num_max);
+    ranked
 }
 
 fn to_anchors(runs: &[RunRecord<'_>], set: &AnchorSet, profile: ProfileCandidate) -> Option<Candidate> {

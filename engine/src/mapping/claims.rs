@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::anchors::AnchorSet;
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
+use super::mapper::Refusal;
 use super::place_match::{Channel, Evidence, MatchState, PlaceMatch, Registration};
 use super::run::RunRecord;
 use super::stretches::Stretch;
@@ -67,6 +68,37 @@ pub(crate) fn spatial_match(
         state,
     }
 }
+
+/// A registration that the map refused, as the match that it would have been.
+pub(crate) fn refused_match(refusal: &Refusal, runs: &[RunRecord<'_>], set: &AnchorSet) -> PlaceMatch {
+    let closure = &refusal.closure;
+    let around = |anchor: usize| {
+        let anchor = &set.anchors[anchor];
+        let run = &runs[anchor.run_idx as usize];
+        let scan_seq = run.keyframes[anchor.keyframe as usize].scan_seq;
+        let last = run.observations.len().saturating_sub(1);
+        let middle =
+            run.observations.partition_point(|observation| observation.scan_seq < scan_seq).min(last);
+        Interval {
+            run_idx: anchor.run_idx,
+            first: middle.saturating_sub(REFUSED_HALF_LENGTH) as u32,
+            last: (middle + REFUSED_HALF_LENGTH).min(last) as u32,
+        }
+    };
+    let is_same_way = closure.fit.earlier_from_later.theta.cos() >= 0.0;
+    PlaceMatch {
+        earlier: around(closure.earlier),
+        later: around(closure.later),
+        direction: if is_same_way { Direction::Same } else { Direction::Opposite },
+        channel: refusal.channel,
+        evidence: Evidence { registration: Some(registration_of(set, closure)), ..Evidence::default() },
+        probability: 0.0,
+        state: MatchState::Rejected(refusal.reason),
+    }
+}
+
+/// Observations on either side of an anchor that a refused registration is said to be about: about a metre.
+const REFUSED_HALF_LENGTH: usize = 10;
 
 /// A closure as it is served.
 pub(crate) fn registration_of(set: &AnchorSet, closure: &Closure) -> Registration {

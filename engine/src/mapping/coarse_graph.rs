@@ -7,7 +7,8 @@ use super::config::MappingConfig;
 use super::run::RunRecord;
 use crate::geometry::Pose2;
 use crate::pose_graph::{
-    CovarianceSolver, InformationMatrix, PoseConstraint, PoseGraph, PoseGraphError, optimize,
+    CovarianceSolver, InformationMatrix, PoseConstraint, PoseGraph, PoseGraphError, consistent_sets,
+    optimize_robust,
 };
 use crate::registration::SubmapFit;
 
@@ -46,7 +47,7 @@ impl CoarseGraph {
         Self { odometry, poses, graph: PoseGraph::new() }
     }
 
-    /// Optimises all poses under these closures, dropping one by one in rounds those that contradict the rest.
+    /// Optimises all poses under these closures; those that contradict the rest lose their weight.
     ///
     /// Returns for each closure whether it was kept.
     ///
@@ -58,49 +59,84 @@ impl CoarseGraph {
         closures: &[Closure],
         config: &MappingConfig,
     ) -> Result<Vec<bool>, PoseGraphError> {
-        let mut kept = vec![true; closures.len()];
-        for factor in [16.0, 4.0, 1.0, 1.0] {
-            self.solve(set, closures, &kept, config)?;
-            let mut num_dropped = 0;
-            for (index, closure) in closures.iter().enumerate() {
-                let chi2 = self.chi2(closure, config);
-                let keeps = chi2 <= config.max_chi2 * factor;
-                if kept[index] && !keeps {
-                    num_dropped += 1;
-                }
-                kept[index] = keeps;
-            }
-            if num_dropped == 0 && factor <= 1.0 {
-                break;
-            }
-        }
-        self.solve(set, closures, &kept, config)?;
-        Ok(kept)
+        self.optimise_within(set, closures, &|_| true, config)
     }
 
-    fn solve(
+    /// Optimises only the anchors for which `is_in_scope`; nothing but constraints between them counts.
+    ///
+    /// # Errors
+    /// Whatever the optimiser cannot solve.
+    pub fn optimise_within(
         &mut self,
         set: &AnchorSet,
         closures: &[Closure],
-        kept: &[bool],
+        is_in_scope: &dyn Fn(usize) -> bool,
+        config: &MappingConfig,
+    ) -> Result<Vec<bool>, PoseGraphError> {
+        let mut graph = self.odometry_graph(set, is_in_scope)?;
+        let num_odometry = graph.constraints().len();
+        for closure in closures {
+            graph.add_doubtful(closure_constraint(closure, &Matrix3::zeros(), config))?;
+        }
+        let report = optimize_robust(&mut graph, &config.pose_graph, &config.robust)?;
+        let is_kept: Vec<bool> = report.inlier_weights.iter().map(|&weight| weight > 0.0).collect();
+        self.poses = graph.poses().to_vec();
+        self.graph = graph.with_constraints(|index| is_kept[index]);
+        Ok(is_kept[num_odometry..].to_vec())
+    }
+
+    /// Takes up the constraints of the whole site again, after optimisations of parts of it.
+    ///
+    /// # Errors
+    /// A closure between anchors that do not exist.
+    pub fn assemble(
+        &mut self,
+        set: &AnchorSet,
+        closures: &[Closure],
         config: &MappingConfig,
     ) -> Result<(), PoseGraphError> {
+        let mut graph = self.odometry_graph(set, &|_| true)?;
+        for closure in closures {
+            graph.add_doubtful(closure_constraint(closure, &Matrix3::zeros(), config))?;
+        }
+        self.graph = graph;
+        Ok(())
+    }
+
+    fn odometry_graph(
+        &self,
+        set: &AnchorSet,
+        is_in_scope: &dyn Fn(usize) -> bool,
+    ) -> Result<PoseGraph, PoseGraphError> {
         let mut graph = PoseGraph::new();
         for pose in &self.poses {
             graph.add_pose(*pose)?;
         }
-        for (from, covariance) in &self.odometry {
+        for (from, covariance) in self.odometry.iter().filter(|(from, _)| is_in_scope(*from)) {
             let motion = set.anchors[*from].run_from_anchor.between(&set.anchors[from + 1].run_from_anchor);
-            add(&mut graph, *from, from + 1, motion, covariance)?;
+            graph.add_constraint(constraint(*from, from + 1, motion, covariance))?;
         }
-        for (closure, _) in closures.iter().zip(kept).filter(|(_, kept)| **kept) {
-            let covariance = with_floor(&closure.fit.covariance, config);
-            add(&mut graph, closure.earlier, closure.later, closure.fit.earlier_from_later, &covariance)?;
-        }
-        optimize(&mut graph, &config.pose_graph)?;
-        self.poses = graph.poses().to_vec();
-        self.graph = graph;
-        Ok(())
+        Ok(graph)
+    }
+
+    /// The largest set of closures between two components that agree pair by pair, by index, ascending; `is_in_scope`
+    /// holds for the anchors of the two. Only after [`CoarseGraph::optimise`].
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve.
+    pub fn consistent(
+        &self,
+        closures: &[Closure],
+        is_in_scope: &dyn Fn(usize) -> bool,
+        config: &MappingConfig,
+    ) -> Result<Vec<usize>, PoseGraphError> {
+        let candidates: Vec<PoseConstraint> =
+            closures.iter().map(|closure| closure_constraint(closure, &slack(), config)).collect();
+        let constraints = self.graph.constraints();
+        let graph = self.graph.with_constraints(|index| is_in_scope(constraints[index].i as usize));
+        let sets = consistent_sets(&graph, &candidates, &config.consistency)?;
+        let largest = sets.into_iter().max_by_key(|set| set.members.len());
+        Ok(largest.map_or(Vec::new(), |set| set.members.iter().map(|&member| member as usize).collect()))
     }
 
     /// Squared deviations of a closure from the present poses.
@@ -134,20 +170,23 @@ pub(crate) fn deviation2(a: &Pose2, b: &Pose2, covariance: &Matrix3<f64>) -> f64
         .map_or(f64::INFINITY, |inverse| (difference.transpose() * inverse * difference)[0])
 }
 
+/// What the graph's covariance does not know: submaps are not rigid.
+pub(crate) fn slack() -> Matrix3<f64> {
+    Matrix3::from_diagonal(&nalgebra::Vector3::new(0.1 * 0.1, 0.1 * 0.1, 0.03 * 0.03))
+}
+
+fn closure_constraint(closure: &Closure, doubt: &Matrix3<f64>, config: &MappingConfig) -> PoseConstraint {
+    let covariance = with_floor(&closure.fit.covariance, config) + doubt;
+    constraint(closure.earlier, closure.later, closure.fit.earlier_from_later, &covariance)
+}
+
 /// Covariances are given in the axes of the first pose; the graph wants them in those of the measurement.
-fn add(
-    graph: &mut PoseGraph,
-    i: usize,
-    j: usize,
-    i_from_j: Pose2,
-    covariance: &Matrix3<f64>,
-) -> Result<(), PoseGraphError> {
+fn constraint(i: usize, j: usize, i_from_j: Pose2, covariance: &Matrix3<f64>) -> PoseConstraint {
     let turned = crate::registration::rotated(covariance, -i_from_j.theta);
     let symmetric = (turned + turned.transpose()) * 0.5;
     let information = symmetric.try_inverse().unwrap_or_else(|| Matrix3::identity() * 1e-6);
     let information = InformationMatrix::try_new((information + information.transpose()) * 0.5)
-        .or_else(|_| InformationMatrix::from_standard_deviations(1.0, 1.0, 1.0));
-    let Ok(information) = information else { return Ok(()) };
-    graph.add_constraint(PoseConstraint { i: i as u32, j: j as u32, i_from_j, information })?;
-    Ok(())
+        .or_else(|_| InformationMatrix::from_standard_deviations(1.0, 1.0, 1.0))
+        .expect("unit deviations make a positive definite matrix");
+    PoseConstraint { i: i as u32, j: j as u32, i_from_j, information }
 }

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::changes::ChangesConfig;
 use crate::config::ConfigError;
-use crate::pose_graph::PoseGraphConfig;
+use crate::pose_graph::{ConsistencyConfig, PoseGraphConfig, RobustConfig};
 use crate::registration::SubmapConfig;
 use crate::retrieval::RetrievalConfig;
 
@@ -17,6 +18,12 @@ pub struct MappingConfig {
     pub submap: SubmapConfig,
     /// Least squares.
     pub pose_graph: PoseGraphConfig,
+    /// How constraints that may be wrong are weighed.
+    pub robust: RobustConfig,
+    /// Which registrations between two runs hold together.
+    pub consistency: ConsistencyConfig,
+    /// What counts as changed between two sessions.
+    pub changes: ChangesConfig,
     /// Travel between the anchors of submaps, metres.
     pub anchor_spacing_m: f64,
     /// Travel before and behind an anchor whose scans make its submap, metres.
@@ -49,7 +56,7 @@ pub struct MappingConfig {
     pub max_search_turn_rad: f64,
     /// Rounds of guided matching at most.
     pub max_rounds: usize,
-    /// A constraint is refused when its squared deviations exceed this.
+    /// A registration is refused when its squared deviations from the prediction exceed this.
     pub max_chi2: f64,
     /// Fits that must support a fit when the place was uncertain.
     pub min_support: usize,
@@ -59,8 +66,20 @@ pub struct MappingConfig {
     pub min_joining_share: f64,
     /// Largest standard deviation of the place of one run in the other, metres.
     pub max_joining_sd_m: f64,
-    /// The runner-up must have less than this share of the best hypothesis' support.
+    /// Another way to join the same two maps must fit at less than this share of the anchors.
     pub max_ambiguity: f64,
+    /// Profile candidates of two runs that are registered, the best first.
+    pub max_candidates_per_pair: usize,
+    /// Anchors whose registrations must agree before a joined map is tried.
+    pub min_seeds: usize,
+    /// Ways to join two maps that are tried.
+    pub max_hypotheses: usize,
+    /// Share of the returns of one map that another may contradict where they overlap, in the direction in which it is
+    /// less: furniture that came or went shows in one direction only, another building in both.
+    pub max_contradiction: f64,
+    /// Two maps may also be joined when they contradict each other, both directions together, no more than this
+    /// multiple of the share in which their own runs contradict themselves.
+    pub max_contradiction_ratio: f64,
 }
 
 impl Default for MappingConfig {
@@ -69,6 +88,15 @@ impl Default for MappingConfig {
             retrieval: RetrievalConfig { query_step_m: 2.0, ..RetrievalConfig::default() },
             submap: SubmapConfig::default(),
             pose_graph: PoseGraphConfig::default(),
+            robust: RobustConfig {
+                inlier_chi2_max: 16.0,
+                max_reweightings: 100,
+                // Guided matching has already asked for support.
+                support_steps_max: 0,
+                ..RobustConfig::default()
+            },
+            consistency: ConsistencyConfig::default(),
+            changes: ChangesConfig::default(),
             anchor_spacing_m: 2.0,
             submap_half_length_m: 4.0,
             max_submap_scans: 50,
@@ -91,6 +119,11 @@ impl Default for MappingConfig {
             min_joining_share: 0.7,
             max_joining_sd_m: 0.2,
             max_ambiguity: 0.7,
+            max_candidates_per_pair: 600,
+            min_seeds: 2,
+            max_hypotheses: 3,
+            max_contradiction: 0.04,
+            max_contradiction_ratio: 1.4,
         }
     }
 }
@@ -104,6 +137,9 @@ impl MappingConfig {
         self.retrieval.validate(&format!("{path}.retrieval"))?;
         self.submap.validate(&format!("{path}.submap"))?;
         self.pose_graph.validate(&format!("{path}.pose_graph"))?;
+        self.robust.validate(&format!("{path}.robust"))?;
+        self.consistency.validate(&format!("{path}.consistency"))?;
+        self.changes.validate(&format!("{path}.changes"))?;
         let positive = [
             ("anchor_spacing_m", self.anchor_spacing_m),
             ("submap_half_length_m", self.submap_half_length_m),

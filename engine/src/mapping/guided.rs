@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 
 use super::anchors::AnchorSet;
-use super::coarse_graph::{Closure, CoarseGraph, deviation2, with_floor};
+use super::coarse_graph::{Closure, CoarseGraph, deviation2, slack, with_floor};
 use super::config::MappingConfig;
 use super::memo::{RegistrationMemo, Request};
 use crate::geometry::Pose2;
@@ -26,6 +26,8 @@ pub(crate) struct GuidedRound {
     pub closures: Vec<Closure>,
     /// All pairs of anchors that were registered.
     pub tried: Vec<(usize, usize)>,
+    /// Fits of submaps that agree, but not with the graph or with the fits around.
+    pub refused: Vec<Closure>,
 }
 
 /// Registers all neighbours of one graph that may be matched, and keeps the fits that agree with it and with each other.
@@ -44,31 +46,29 @@ pub(crate) fn guided_closures(
     let fits = memo.answers(&requests, set, &config.submap);
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
+    let mut refused = Vec::new();
     for (pair, fit) in neighbours.iter().zip(fits) {
         let Some(fit) = fit else { continue };
         if fit.agreement < config.min_agreement || fit.overlap < config.min_overlap {
             continue;
         }
+        let closure = Closure { earlier: pair.request.earlier, later: pair.request.later, fit };
         let gate = pair.covariance + with_floor(&fit.covariance, config) + slack();
         if deviation2(&pair.predicted, &fit.earlier_from_later, &gate) > config.max_chi2 {
+            refused.push(closure);
             continue;
         }
-        closures.push(Closure { earlier: pair.request.earlier, later: pair.request.later, fit });
+        closures.push(closure);
         uncertain.push(pair.place_sd_m > 0.5);
     }
-    let supported: Vec<Closure> = closures
-        .iter()
-        .zip(&uncertain)
-        .filter(|(closure, uncertain)| !**uncertain || support(set, closure, &closures) >= config.min_support)
-        .map(|(closure, _)| *closure)
-        .collect();
+    let is_supported = |(closure, uncertain): &(&Closure, &bool)| {
+        !**uncertain || support(set, closure, &closures) >= config.min_support
+    };
+    let (supported, alone): (Vec<_>, Vec<_>) = closures.iter().zip(&uncertain).partition(is_supported);
+    refused.extend(alone.into_iter().map(|(closure, _)| *closure));
+    let supported = supported.into_iter().map(|(closure, _)| *closure).collect();
     let tried = requests.iter().map(|request| (request.earlier, request.later)).collect();
-    Ok(GuidedRound { closures: supported, tried })
-}
-
-/// What the graph's covariance does not know: submaps are not rigid.
-fn slack() -> Matrix3<f64> {
-    Matrix3::from_diagonal(&nalgebra::Vector3::new(0.1 * 0.1, 0.1 * 0.1, 0.03 * 0.03))
+    Ok(GuidedRound { closures: supported, tried, refused })
 }
 
 fn find_neighbours(
@@ -136,7 +136,7 @@ fn support(set: &AnchorSet, closure: &Closure, all: &[Closure]) -> usize {
 }
 
 /// True when going round the loop of two closures and the odometry between them comes back to the start.
-pub(crate) fn agrees(set: &AnchorSet, a: &Closure, b: &Closure) -> bool {
+fn agrees(set: &AnchorSet, a: &Closure, b: &Closure) -> bool {
     let earlier_step = step(set, a.earlier, b.earlier);
     let later_step = step(set, a.later, b.later);
     let one_way = a.fit.earlier_from_later.compose(&later_step);

@@ -5,7 +5,8 @@
 //! lays the two runs over each other, and must hold nearly everywhere, over a long enough drive, in every direction,
 //! and clearly better than any other.
 
-use std::collections::BTreeSet;
+use std::cmp::Reverse;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Matrix2;
 
@@ -15,6 +16,7 @@ use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
 use super::memo::{RegistrationMemo, Request};
 use crate::geometry::Pose2;
+use crate::pose_graph::PoseGraphError;
 use crate::registration::SearchWindow;
 
 /// A way to lay one component over another.
@@ -30,6 +32,18 @@ pub(crate) struct Hypothesis {
     pub closures: Vec<Closure>,
     /// Number of different anchors of the guest among them.
     pub num_anchors: usize,
+}
+
+impl Hypothesis {
+    /// Orders hypotheses: the surest last.
+    pub fn rank(&self) -> (usize, Reverse<u32>, Reverse<u32>) {
+        (self.num_anchors, Reverse(self.host), Reverse(self.guest))
+    }
+
+    /// True when it joins this component to another.
+    pub const fn is_about(&self, component: u32) -> bool {
+        self.host == component || self.guest == component
+    }
 }
 
 /// Registers the candidates between different components.
@@ -58,110 +72,69 @@ pub(crate) fn registered_candidates(
         .collect()
 }
 
-/// The best hypotheses between every two components, most anchors first. A hypothesis that has a rival of nearly as
-/// many anchors is left out.
+/// The best few hypotheses between every two components that are wanted: sets of registrations that agree pair by
+/// pair, the largest first.
+///
+/// # Errors
+/// Whatever the graph cannot solve.
 pub(crate) fn hypotheses(
     closures: &[Closure],
     set: &AnchorSet,
     graph: &CoarseGraph,
     components: &[u32],
+    is_wanted: &dyn Fn(u32, u32) -> bool,
     config: &MappingConfig,
-) -> Vec<Hypothesis> {
+) -> Result<Vec<Vec<Hypothesis>>, PoseGraphError> {
     let component = |anchor: usize| components[set.anchors[anchor].run_idx as usize];
-    let mut pairs: BTreeSet<(u32, u32)> = BTreeSet::new();
+    let mut pairs: BTreeMap<(u32, u32), Vec<Closure>> = BTreeMap::new();
     for closure in closures {
         let (a, b) = (component(closure.earlier), component(closure.later));
-        if a != b {
-            pairs.insert((a.min(b), a.max(b)));
+        if a != b && is_wanted(a, b) {
+            pairs.entry((a.min(b), a.max(b))).or_default().push(*closure);
         }
     }
     let mut found = Vec::new();
-    for (host, guest) in pairs {
-        let between: Vec<Closure> = closures
-            .iter()
-            .filter(|closure| {
-                let (a, b) = (component(closure.earlier), component(closure.later));
-                (a, b) == (host, guest) || (b, a) == (host, guest)
-            })
-            .copied()
-            .collect();
-        let oriented: Vec<Vote> =
-            between.iter().map(|closure| vote(closure, graph, component, host)).collect();
-        let Some(best) = best_hypothesis(&oriented, &between, graph, (host, guest), &[]) else { continue };
-        let rival = best_hypothesis(&oriented, &between, graph, (host, guest), &best.closures);
-        let rival_anchors = rival.map_or(0, |rival| rival.num_anchors);
-        if rival_anchors as f64 <= config.max_ambiguity * best.num_anchors as f64 && best.num_anchors >= 3 {
-            found.push(best);
+    for ((host, guest), mut between) in pairs {
+        let mut rivals = Vec::new();
+        while rivals.len() < config.max_hypotheses {
+            let is_in_scope = |anchor: usize| [host, guest].contains(&component(anchor));
+            let members = graph.consistent(&between, &is_in_scope, config)?;
+            let is_member = |index: usize| members.binary_search(&index).is_ok();
+            let agreeing: Vec<Closure> = members.iter().map(|&index| between[index]).collect();
+            let Some(hypothesis) = hypothesis(agreeing, graph, component, (host, guest)) else { break };
+            if hypothesis.num_anchors < config.min_seeds {
+                break;
+            }
+            rivals.push(hypothesis);
+            let left = between.iter().enumerate().filter(|(index, _)| !is_member(*index));
+            between = left.map(|(_, closure)| *closure).collect();
+        }
+        if !rivals.is_empty() {
+            found.push(rivals);
         }
     }
-    found.sort_by_key(|hypothesis| {
-        (std::cmp::Reverse(hypothesis.num_anchors), hypothesis.host, hypothesis.guest)
-    });
-    found
+    Ok(found)
 }
 
-/// What one closure says of the two frames.
-#[derive(Clone, Copy, Debug)]
-struct Vote {
-    host_anchor: usize,
-    guest_anchor: usize,
-    host_from_guest: Pose2,
-    /// Pose of the guest's anchor in the host's frame.
-    host_from_anchor: Pose2,
-}
-
-fn vote(closure: &Closure, graph: &CoarseGraph, component: impl Fn(usize) -> u32, host: u32) -> Vote {
-    let (host_anchor, guest_anchor, relative) = if component(closure.earlier) == host {
-        (closure.earlier, closure.later, closure.fit.earlier_from_later)
-    } else {
-        (closure.later, closure.earlier, closure.fit.earlier_from_later.inverse())
+/// How closures that agree lay the guest over the host: as the surest of them says.
+fn hypothesis(
+    closures: Vec<Closure>,
+    graph: &CoarseGraph,
+    component: impl Fn(usize) -> u32,
+    (host, guest): (u32, u32),
+) -> Option<Hypothesis> {
+    let ends = |closure: &Closure| match component(closure.earlier) == host {
+        true => (closure.earlier, closure.later, closure.fit.earlier_from_later),
+        false => (closure.later, closure.earlier, closure.fit.earlier_from_later.inverse()),
     };
+    let doubt = |closure: &Closure| closure.fit.covariance.fixed_view::<2, 2>(0, 0).trace();
+    let surest = closures.iter().min_by(|a, b| doubt(a).total_cmp(&doubt(b)))?;
+    let (host_anchor, guest_anchor, relative) = ends(surest);
     let host_from_anchor = graph.poses[host_anchor].compose(&relative);
     let host_from_guest = host_from_anchor.compose(&graph.poses[guest_anchor].inverse());
-    Vote { host_anchor, guest_anchor, host_from_guest, host_from_anchor }
-}
-
-/// The seed with most agreeing anchors; seeds that agree with `excluded` closures are not tried.
-fn best_hypothesis(
-    votes: &[Vote],
-    closures: &[Closure],
-    graph: &CoarseGraph,
-    (host, guest): (u32, u32),
-    excluded: &[Closure],
-) -> Option<Hypothesis> {
-    let is_excluded = |index: usize| {
-        excluded
-            .iter()
-            .any(|other| (other.earlier, other.later) == (closures[index].earlier, closures[index].later))
-    };
-    let mut best: Option<(usize, usize, Vec<usize>)> = None;
-    for (seed_idx, seed) in votes.iter().enumerate().filter(|(index, _)| !is_excluded(*index)) {
-        let members: Vec<usize> = (0..votes.len())
-            .filter(|&index| !is_excluded(index))
-            .filter(|&index| agrees(seed, &votes[index], graph))
-            .collect();
-        let anchors: BTreeSet<usize> = members.iter().map(|&index| votes[index].guest_anchor).collect();
-        let hosts: BTreeSet<usize> = members.iter().map(|&index| votes[index].host_anchor).collect();
-        let num_anchors = anchors.len().min(hosts.len());
-        if best.as_ref().is_none_or(|(count, _, _)| num_anchors > *count) {
-            best = Some((num_anchors, seed_idx, members));
-        }
-    }
-    best.map(|(num_anchors, seed_idx, members)| Hypothesis {
-        host,
-        guest,
-        host_from_guest: votes[seed_idx].host_from_guest,
-        closures: members.iter().map(|&index| closures[index]).collect(),
-        num_anchors,
-    })
-}
-
-/// Two votes agree when the seed's frame puts the other's anchor where the other says; looser with distance.
-fn agrees(seed: &Vote, other: &Vote, graph: &CoarseGraph) -> bool {
-    let predicted = seed.host_from_guest.compose(&graph.poses[other.guest_anchor]);
-    let error = predicted.between(&other.host_from_anchor);
-    let apart_m = graph.poses[seed.guest_anchor].distance(&graph.poses[other.guest_anchor]);
-    error.x.hypot(error.y) < 0.5 + 0.05 * apart_m && error.theta.abs() < 0.08 + 0.002 * apart_m
+    let hosts: BTreeSet<usize> = closures.iter().map(|closure| ends(closure).0).collect();
+    let guests: BTreeSet<usize> = closures.iter().map(|closure| ends(closure).1).collect();
+    Some(Hypothesis { host, guest, host_from_guest, closures, num_anchors: hosts.len().min(guests.len()) })
 }
 
 /// How well a joined map holds between host and guest.
@@ -173,6 +146,26 @@ pub(crate) struct JoinReport {
     pub share: f64,
     /// Standard deviation of the worst direction, metres.
     pub worst_sd_m: f64,
+    /// Share of the returns of the two that contradict each other wherever they overlap.
+    pub contradiction: f64,
+    /// The share that the one contradicts of what the other saw, whichever way is less: furniture that came or went
+    /// counts only one way.
+    pub one_sided_contradiction: f64,
+    /// Contradiction between places of one run, the worse of the two maps.
+    pub own_contradiction: f64,
+    /// True when the joined map brings together what a person said are different places.
+    pub is_vetoed: bool,
+}
+
+impl JoinReport {
+    /// True when the joined map may stand.
+    pub fn holds(&self, config: &MappingConfig) -> bool {
+        self.num_anchors >= config.min_joining_anchors
+            && self.share >= config.min_joining_share
+            && self.worst_sd_m <= config.max_joining_sd_m
+            && (self.one_sided_contradiction <= config.max_contradiction
+                || self.contradiction <= config.max_contradiction_ratio * self.own_contradiction)
+    }
 }
 
 /// Judges a tentatively joined map by its closures and all pairs that were tried.
@@ -207,5 +200,6 @@ pub(crate) fn judge_join(
         num_anchors: anchors.len(),
         share: confirmed as f64 / tried.len().max(1) as f64,
         worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
+        ..JoinReport::default()
     }
 }

@@ -12,6 +12,7 @@ mod judgements;
 mod mapper;
 mod memo;
 mod occupancy;
+mod overlap;
 mod place_match;
 mod placement;
 mod refused;

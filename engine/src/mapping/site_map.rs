@@ -18,7 +18,7 @@ pub struct MappedRun {
 pub struct SiteMap {
     /// Claims of places driven twice, best first by nothing: in a fixed order.
     pub matches: Vec<PlaceMatch>,
-    /// Candidates between runs that registration refused, best first; a bounded number of them.
+    /// Registrations that fit where they are but do not constrain the map, each with its reason; in a fixed order.
     pub refused: Vec<PlaceMatch>,
     /// Runs in the order they were given.
     pub runs: Vec<MappedRun>,

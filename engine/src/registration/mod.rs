@@ -20,5 +20,6 @@ pub use branch_and_bound::SearchWindow;
 pub use config::{OdometryNoise, RefinerConfig, SubmapConfig};
 pub(crate) use refiner::rotated;
 pub use refiner::{KeyframeMotion, OdometryRefiner, Refined};
+pub(crate) use register::Opinions;
 pub use register::{SubmapFit, refine_from, register};
 pub use submap::{Submap, SubmapScan};

@@ -58,12 +58,10 @@ pub fn refine_from(
     let prior = Matrix3::from_diagonal(&nalgebra::Vector3::new(by_place, by_place, by_turn));
     let alignment = align(&earlier.surfaces, &later.fine_points, start, &prior, start, &settings);
     let pose = alignment.map_from_points;
-    let forward = opinions(&earlier.evidence, &later.fine_points, &pose);
-    let backward = opinions(&later.evidence, &earlier.fine_points, &pose.inverse());
+    let opinions = Opinions::of(earlier, later, &pose).all();
+    let num_opinions = opinions.num_confirmed + opinions.num_contradicted;
     let num_points = (later.fine_points.len() + earlier.fine_points.len()) as f64;
-    let confirmed = forward.0 + backward.0;
-    let opinions = confirmed + forward.1 + backward.1;
-    if opinions == 0 {
+    if num_opinions == 0 {
         return None;
     }
     let mut covariance = alignment.information.try_inverse()?;
@@ -78,23 +76,76 @@ pub fn refine_from(
     Some(SubmapFit {
         earlier_from_later: pose,
         covariance,
-        agreement: f64::from(confirmed) / f64::from(opinions),
-        overlap: f64::from(opinions) / num_points,
+        agreement: f64::from(opinions.num_confirmed) / f64::from(num_opinions),
+        overlap: f64::from(num_opinions) / num_points,
     })
 }
 
-/// How many of the points the grid confirms, and how many it contradicts because it saw free space there.
-fn opinions(grid: &EvidenceGrid, points: &[Point2], grid_from_points: &Pose2) -> (u32, u32) {
-    let (sin, cos) = grid_from_points.theta.sin_cos();
-    let (mut confirmed, mut contradicted) = (0, 0);
-    for point in points {
-        let x = grid_from_points.x + cos * point.x - sin * point.y;
-        let y = grid_from_points.y + sin * point.x + cos * point.y;
-        match grid.at(&Point2::new(x, y)) {
-            CellEvidence::Surface => confirmed += 1,
-            CellEvidence::Free => contradicted += 1,
-            CellEvidence::Unknown => {}
+/// What one submap says of the returns of another.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Tally {
+    /// Returns that lie on a surface.
+    pub num_confirmed: u32,
+    /// Returns where there is free space.
+    pub num_contradicted: u32,
+}
+
+impl Tally {
+    /// Share of the returns with an opinion that are contradicted; 0 without opinions.
+    pub fn contradiction(&self) -> f64 {
+        f64::from(self.num_contradicted) / f64::from((self.num_confirmed + self.num_contradicted).max(1))
+    }
+
+    fn count(grid: &EvidenceGrid, points: &[Point2], grid_from_points: &Pose2) -> Self {
+        let mut tally = Self::default();
+        let (sin, cos) = grid_from_points.theta.sin_cos();
+        for point in points {
+            let x = grid_from_points.x + cos * point.x - sin * point.y;
+            let y = grid_from_points.y + sin * point.x + cos * point.y;
+            match grid.at(&Point2::new(x, y)) {
+                CellEvidence::Surface => tally.num_confirmed += 1,
+                CellEvidence::Free => tally.num_contradicted += 1,
+                CellEvidence::Unknown => {}
+            }
+        }
+        tally
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        Self {
+            num_confirmed: self.num_confirmed + other.num_confirmed,
+            num_contradicted: self.num_contradicted + other.num_contradicted,
         }
     }
-    (confirmed, contradicted)
+}
+
+/// What two submaps at a given relative pose say of each other's returns.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Opinions {
+    /// What the earlier says of the later.
+    pub of_later: Tally,
+    /// What the later says of the earlier.
+    pub of_earlier: Tally,
+}
+
+impl Opinions {
+    /// Compares two submaps as they lie, without moving them.
+    pub fn of(earlier: &Submap, later: &Submap, earlier_from_later: &Pose2) -> Self {
+        Self {
+            of_later: Tally::count(&earlier.evidence, &later.fine_points, earlier_from_later),
+            of_earlier: Tally::count(&later.evidence, &earlier.fine_points, &earlier_from_later.inverse()),
+        }
+    }
+
+    /// Both ways together.
+    pub fn all(&self) -> Tally {
+        self.of_later.plus(&self.of_earlier)
+    }
+}
+
+impl std::ops::AddAssign for Opinions {
+    fn add_assign(&mut self, other: Self) {
+        self.of_later = self.of_later.plus(&other.of_later);
+        self.of_earlier = self.of_earlier.plus(&other.of_earlier);
+    }
 }
