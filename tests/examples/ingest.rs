@@ -93,14 +93,28 @@ fn bodies(options: &Options) -> Vec<Vec<u8>> {
     batches
         .map(|(idx, scans)| {
             let body = json!({"first_sequence": idx * options.batch, "scans": scans});
-            if !options.is_cbor {
-                return serde_json::to_vec(&body).unwrap();
-            }
-            let mut bytes = Vec::new();
-            ciborium::into_writer(&body, &mut bytes).unwrap();
-            bytes
+            if options.is_cbor { cbor(&body) } else { serde_json::to_vec(&body).unwrap() }
         })
         .collect()
+}
+
+/// The batch as CBOR with the readings of a scan as one byte string.
+fn cbor(body: &serde_json::Value) -> Vec<u8> {
+    let mut value = ciborium::Value::serialized(body).unwrap();
+    let scans = entry(&mut value, "scans").as_array_mut().unwrap();
+    for (scan, sent) in scans.iter_mut().zip(body["scans"].as_array().unwrap()) {
+        let ranges = sent["ranges_m"].as_array().unwrap();
+        let floats = ranges.iter().map(|range_m| range_m.as_f64().map_or(f32::NAN, |range_m| range_m as f32));
+        *entry(scan, "ranges_m") = ciborium::Value::Bytes(floats.flat_map(f32::to_le_bytes).collect());
+    }
+    let mut bytes = Vec::new();
+    ciborium::into_writer(&value, &mut bytes).unwrap();
+    bytes
+}
+
+fn entry<'a>(map: &'a mut ciborium::Value, name: &str) -> &'a mut ciborium::Value {
+    let entries = map.as_map_mut().unwrap();
+    entries.iter_mut().find(|(key, _)| key.as_text() == Some(name)).map(|(_, value)| value).unwrap()
 }
 
 /// Posts every batch to each of the runs in turn.
