@@ -21,7 +21,8 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::auth;
 use crate::error::ApiError;
 use crate::handlers::{
-    batches, jobs, labels, localisations, maps, matches, operations, places, queries, runs, sites, texts,
+    batches, changes, jobs, labels, localisations, maps, matches, operations, places, queries, runs, sites,
+    texts,
 };
 use crate::openapi::{self, Document};
 use crate::state::AppState;
@@ -69,6 +70,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(labels::query_labels))
         .routes(routes!(places::list_places))
         .routes(routes!(places::get_route))
+        .routes(routes!(changes::list_changes))
         .routes(routes!(localisations::query_example_everywhere))
 }
 

@@ -4,6 +4,7 @@
 mod access;
 mod bad_input;
 mod batches;
+mod changes;
 mod crash;
 mod maps;
 mod sites;

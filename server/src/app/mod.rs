@@ -19,6 +19,7 @@ use crate::config::ServerConfig;
 use crate::storage::Storage;
 
 mod builds;
+pub mod changes;
 mod error;
 pub mod exports;
 mod grids;

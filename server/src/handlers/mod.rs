@@ -1,6 +1,7 @@
 //! One file per resource; a handler extracts, calls one use case and wraps the answer.
 
 pub mod batches;
+pub mod changes;
 pub mod encodings;
 pub mod jobs;
 pub mod labels;
