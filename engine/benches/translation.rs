@@ -16,7 +16,7 @@ use std::path::PathBuf;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use literal::density::{Content, literal_flood, literal_groups};
 use literal::local_map::LiteralMap;
-use locution_engine::config::TranslatorConfig;
+use locution_engine::config::{OdometrySource, TranslatorConfig};
 use locution_engine::density::{DensityConfig, DensityEstimator, KernelConfig};
 use locution_engine::formats::{CarmenOptions, read_carmen_log};
 use locution_engine::geometry::{Point2, Pose2};
@@ -92,9 +92,10 @@ fn intel() -> Option<(ScanGeometry, Vec<Scan>)> {
     Some((log.geometry, log.scans))
 }
 
-/// The setting of the project's speed target: one kernel of 4 m, observed at once.
+/// The setting of the project's speed target: odometry as sent, one kernel of 4 m, observed at once.
 fn one_kernel() -> TranslatorConfig {
     TranslatorConfig {
+        odometry: OdometrySource::Raw,
         density: DensityConfig { kernels: vec![KernelConfig::uniform(4.0)], ..DensityConfig::default() },
         sampling: SamplingConfig { delay_m: 0.0, ..SamplingConfig::default() },
         ..TranslatorConfig::default()
@@ -120,11 +121,11 @@ fn translate(criterion: &mut Criterion) {
         });
     };
     let scans = corridor_scans();
-    add("corridor/one 4 m kernel", &one_kernel(), &geometry(), &scans);
+    add("corridor/raw odometry, one 4 m kernel", &one_kernel(), &geometry(), &scans);
     add("corridor/defaults", &TranslatorConfig::default(), &geometry(), &scans);
     match intel() {
         Some((geometry, scans)) => {
-            add("intel/one 4 m kernel", &one_kernel(), &geometry, &scans[2000..4000]);
+            add("intel/raw odometry, one 4 m kernel", &one_kernel(), &geometry, &scans[2000..4000]);
             add("intel/defaults", &TranslatorConfig::default(), &geometry, &scans[2000..4000]);
         }
         None => println!("skipped: the recording intel is not there"),

@@ -62,6 +62,9 @@ impl DensityEstimator {
     fn estimate_rows<const W: usize>(&self, grid: &impl OccupancyRows, center: Cell) -> FreeSpaceDensity {
         let mut window = Window::<W>::read(grid, center, self.reach);
         window.free[self.reach].insert(self.reach);
+        // What counts as free is no opening into the unknown.
+        window.unknown[self.reach] =
+            window.unknown[self.reach].and_not(&BitRow::range(self.reach, self.reach));
         let mut reached = vec![BitRow::EMPTY; window.free.len()];
         reached[self.reach].insert(self.reach);
         let mut answer =

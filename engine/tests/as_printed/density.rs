@@ -101,6 +101,18 @@ proptest! {
 }
 
 #[test]
+fn the_place_of_the_robot_is_no_opening_into_the_unknown() {
+    let mut grid = Square { side: 21, cells: vec![Content::Free; 21 * 21] };
+    grid.cells[10 * 21 + 10] = Content::Unknown;
+    let config = DensityConfig {
+        kernels: vec![KernelConfig::uniform(0.5)],
+        opening_tolerance: 0.0,
+        ..DensityConfig::default()
+    };
+    assert!(DensityEstimator::new(&config, RESOLUTION_M).estimate(&grid, Cell::new(10, 10)).is_hard);
+}
+
+#[test]
 fn an_empty_disc_is_one_for_every_kernel() {
     let grid = Square { side: 101, cells: vec![Content::Free; 101 * 101] };
     for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
