@@ -157,7 +157,7 @@ impl Site {
             batch.put(Key::PackedText(generation, run, part).encode(), codec::encode(&bytes.to_vec()));
         }
         match self.store().commit(batch, vec![is_there]).await {
-            Ok(()) | Err(StorageError::Conflict { .. }) => Ok(()),
+            Ok(()) | Err(StorageError::Conflict) => Ok(()),
             Err(error) => Err(error.into()),
         }
     }
