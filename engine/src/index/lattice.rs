@@ -15,7 +15,7 @@
 
 use thiserror::Error;
 
-use super::tolerance::Syllables;
+use super::tolerance::{Syllables, WordWindow};
 use crate::text::{Word, WordId};
 
 /// Marks a node at which no word of a level ends; no word has this class.
@@ -45,11 +45,15 @@ pub const fn num_nodes_covered(level: usize) -> usize {
     if level == 0 { 1 } else { level + 2 }
 }
 
-/// The words of one level: by the node they end at, and by class.
+/// Words of one class are kept apart by the number of binary digits of their size.
+const NUM_SIZE_GROUPS: usize = u16::BITS as usize + 1;
+
+/// The words of one level: by the node they end at, and by likeness.
 #[derive(Clone, Debug, Default)]
 pub struct LevelColumns {
     by_node: WordColumns,
-    by_class: Vec<ClassColumns>,
+    /// [`NUM_SIZE_GROUPS`] for each class.
+    alike: Vec<AlikeColumns>,
     /// Where each word of the level ends, by its index.
     ends: Vec<u32>,
     /// Index of the word within its level, one entry per node.
@@ -64,9 +68,9 @@ struct WordColumns {
     turn: Vec<i16>,
 }
 
-/// The words of one class and level, in the order in which they end: all that a word of the class can match.
+/// Words of one level and class and of about one size, in the order in which they end.
 #[derive(Clone, Debug, Default)]
-pub struct ClassColumns {
+pub struct AlikeColumns {
     /// The node each word ends at, ascending.
     pub ends: Vec<u32>,
     /// Number of observations of each word.
@@ -81,9 +85,11 @@ impl LevelColumns {
         self.ends.len()
     }
 
-    /// The words of one class; `None` if the class is beyond all that occur.
-    pub fn of_class(&self, class: u16) -> Option<&ClassColumns> {
-        self.by_class.get(usize::from(class))
+    /// All words of the class and of about the sizes of a window, in a few groups: whatever matches is among them.
+    pub fn like(&self, window: &WordWindow) -> &[AlikeColumns] {
+        let size_max = window.size_min.saturating_add(window.size_span);
+        let (first, last) = (group_of(window.class, window.size_min), group_of(window.class, size_max));
+        self.alike.get(first..=last).unwrap_or_default()
     }
 
     fn push_absent(&mut self) {
@@ -103,8 +109,8 @@ impl LevelColumns {
         // The mark of a node without a word stays as it is.
         let renumbered = |&index: &u32| if index == u32::MAX { index } else { index + first_word };
         self.index.extend(other.index.iter().map(renumbered));
-        self.make_room_for_classes(other.by_class.len());
-        for (words, others) in self.by_class.iter_mut().zip(&other.by_class) {
+        self.make_room(other.alike.len());
+        for (words, others) in self.alike.iter_mut().zip(&other.alike) {
             words.ends.extend(others.ends.iter().map(moved));
             words.size.extend_from_slice(&others.size);
             words.turn.extend_from_slice(&others.turn);
@@ -118,18 +124,21 @@ impl LevelColumns {
         self.by_node.turn[node] = syllables.turn;
         self.index[node] = word.id.index;
         self.ends.push(node as u32);
-        let class = usize::from(syllables.class);
-        self.make_room_for_classes(class + 1);
-        let alike = &mut self.by_class[class];
+        self.make_room((usize::from(syllables.class) + 1) * NUM_SIZE_GROUPS);
+        let alike = &mut self.alike[group_of(syllables.class, syllables.size)];
         alike.ends.push(node as u32);
         alike.size.push(syllables.size);
         alike.turn.push(syllables.turn);
     }
 
-    fn make_room_for_classes(&mut self, num_classes: usize) {
-        let num_classes = num_classes.max(self.by_class.len());
-        self.by_class.resize_with(num_classes, ClassColumns::default);
+    fn make_room(&mut self, num_groups: usize) {
+        let num_groups = num_groups.max(self.alike.len());
+        self.alike.resize_with(num_groups, AlikeColumns::default);
     }
+}
+
+fn group_of(class: u16, size: u16) -> usize {
+    usize::from(class) * NUM_SIZE_GROUPS + (u16::BITS - size.leading_zeros()) as usize
 }
 
 /// The text of one run, all levels, by the node at which words end.

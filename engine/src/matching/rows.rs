@@ -7,13 +7,13 @@
 //! level l reaches the rows l + 2 above. Read backwards, an earlier word is entered at its last node and left at its
 //! first one; its column is then its first node and the shift goes the other way.
 //!
-//! Two words can only match within one class, and words without a match leave nothing behind. So a word is compared
-//! with the words of its class, which stand in a row, and a row remembers which of its entries are not 0. No pointers
-//! are kept: [`super::trace`] finds the way back when a chain is wanted.
+//! Two words can only match within one class and about one size, and words without a match leave nothing behind. So a
+//! word is compared only with words alike, which stand together, and a row remembers which of its entries are not 0. No
+//! pointers are kept: [`super::trace`] finds the way back when a chain is wanted.
 
 use std::collections::VecDeque;
 
-use crate::index::{Lattice, WordTolerance, WordWindow, num_nodes_covered};
+use crate::index::{AlikeColumns, Lattice, WordTolerance, WordWindow, num_nodes_covered};
 use crate::text::Direction;
 
 /// What a dynamic programme compares.
@@ -185,7 +185,7 @@ pub(super) struct WordSearch {
 }
 
 impl WordSearch {
-    /// The nodes at which the matching words of a level end, ascending; only words that end at the first
+    /// The nodes at which the matching words of a level end, in no order; only words that end at the first
     /// `num_allowed` nodes count.
     pub fn matching_ends(
         &mut self,
@@ -194,15 +194,19 @@ impl WordSearch {
         window: &WordWindow,
         num_allowed: usize,
     ) -> &[u32] {
-        self.is_match.clear();
         self.ends.clear();
-        let Some(words) = earlier.level(level).and_then(|words| words.of_class(window.class)) else {
-            return &[];
-        };
-        let num_words = words.ends.partition_point(|&end| (end as usize) < num_allowed);
+        for words in earlier.level(level).map_or(&[][..], |words| words.like(window)) {
+            let num_words = words.ends.partition_point(|&end| (end as usize) < num_allowed);
+            self.search(words, num_words, window);
+        }
+        &self.ends
+    }
+
+    /// First all comparisons, which become vector code, then the few words that match, eight at a look.
+    fn search(&mut self, words: &AlikeColumns, num_words: usize, window: &WordWindow) {
         let ends = &words.ends[..num_words];
-        // First all comparisons, which become vector code, then the few words that match, eight at a look.
         let syllables = words.size[..num_words].iter().zip(&words.turn[..num_words]);
+        self.is_match.clear();
         self.is_match.extend(syllables.map(|(&size, &turn)| u8::from(window.contains_of_class(size, turn))));
         let (groups, rest) = self.is_match.as_chunks::<8>();
         for (group, ends) in groups.iter().zip(ends.chunks_exact(8)) {
@@ -214,6 +218,5 @@ impl WordSearch {
         }
         let rest = rest.iter().zip(&ends[num_words - rest.len()..]);
         self.ends.extend(rest.filter(|(is_match, _)| **is_match != 0).map(|(_, &end)| end));
-        &self.ends
     }
 }
