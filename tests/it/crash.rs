@@ -1,4 +1,4 @@
-//! The real binary, killed at random moments, loses nothing that it acknowledged.
+//! The real binary, killed at random moments, loses nothing that it acknowledged and never shows half a change.
 
 use std::io::{BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -149,4 +149,55 @@ async fn twenty_kills_lose_nothing_and_change_no_byte() {
     for (interrupted, undisturbed) in interrupted.iter().zip(&everything(&undisturbed.api).await) {
         assert!(interrupted == undisturbed, "the texts differ");
     }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_kill_while_new_texts_are_written_leaves_the_old_ones() {
+    let binary = binary();
+    let scans = drive(1_000, 12);
+    let directory = tempfile::tempdir().unwrap();
+    let mut process = start_with_mean_shift(&binary, directory.path(), &scans).await;
+    let words = "/v1/sites/a/runs/r/words";
+    let (old, old_words) = (everything(&process.api).await, process.api.get_text(words).await);
+    let build = "/v1/sites/a/builds";
+    // The work begins anew every time, so longer and longer waits reach every part of it.
+    let (mut wait, mut num_kills_before_the_switch) = (Duration::from_millis(1), 0);
+    loop {
+        process.api.post(build, &json!({})).await.ok();
+        tokio::time::sleep(wait).await;
+        process.kill();
+        process = Process::start(&binary, directory.path());
+        let served = process.api.get_text(words).await;
+        if process.api.get("/v1/sites/a").await.ok()["generation"] == 1 {
+            break;
+        }
+        assert!(served == old_words, "neither the old texts nor the new ones, killed after {wait:?}");
+        num_kills_before_the_switch += 1;
+        wait *= 2;
+    }
+    println!("{num_kills_before_the_switch} kills before the switch, the last wait was {wait:?}");
+    assert!(num_kills_before_the_switch >= 3);
+    let job = process.api.post(&format!("{build}?wait=true"), &json!({})).await.ok();
+    assert_eq!(job["state"], "done", "{job}");
+    let interrupted = everything(&process.api).await;
+    assert!(interrupted != old, "a partition by mean shift gives other texts");
+    process.kill();
+
+    let fresh = tempfile::tempdir().unwrap();
+    let undisturbed = start_with_mean_shift(&binary, fresh.path(), &scans).await;
+    undisturbed.api.post(&format!("{build}?wait=true"), &json!({})).await.ok();
+    assert_eq!(undisturbed.api.get("/v1/sites/a").await.ok()["generation"], 1);
+    assert!(everything(&undisturbed.api).await == interrupted, "the new texts differ");
+}
+
+/// A server with one finished run of a site whose classes are the modes of its densities.
+async fn start_with_mean_shift(binary: &Path, directory: &Path, scans: &[Value]) -> Process {
+    let process = Process::start(binary, directory);
+    let config = json!({"config": {"translator": {"quantizer": {"mean_shift": {
+        "num_initial_classes": 8, "bandwidth": 0.03, "min_share": 0.01, "max_moved_share": 0.1}}}}});
+    process.api.put("/v1/sites/a", &config).await.ok();
+    process.api.make_run("a", "r").await;
+    assert_eq!(post_until_killed(&process.api, scans, 0, &AtomicUsize::new(0)).await, scans.len());
+    process.api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
+    process
 }

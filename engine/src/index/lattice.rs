@@ -45,63 +45,70 @@ pub const fn num_nodes_covered(level: usize) -> usize {
     if level == 0 { 1 } else { level + 2 }
 }
 
-/// The words of one level: by the node they end at, and in a row.
+/// The words of one level: by the node they end at, and by class.
 #[derive(Clone, Debug, Default)]
 pub struct LevelColumns {
-    /// One entry per node; no word's class where no word of this level ends.
-    pub by_node: WordColumns,
-    /// One entry per word, by its index within the level.
-    pub in_row: WordColumns,
+    by_node: WordColumns,
+    by_class: Vec<ClassColumns>,
     /// Where each word of the level ends, by its index.
-    pub ends: Vec<u32>,
+    ends: Vec<u32>,
     /// Index of the word within its level, one entry per node.
     index: Vec<u32>,
 }
 
-/// Words as columns of their syllables.
+/// Words as columns of their syllables, one entry per node; [`ABSENT`] is the class where no word of the level ends.
 #[derive(Clone, Debug, Default)]
-pub struct WordColumns {
-    /// Density class.
-    pub class: Vec<u16>,
-    /// Number of observations.
+struct WordColumns {
+    class: Vec<u16>,
+    size: Vec<u16>,
+    turn: Vec<i16>,
+}
+
+/// The words of one class and level, in the order in which they end: all that a word of the class can match.
+#[derive(Clone, Debug, Default)]
+pub struct ClassColumns {
+    /// The node each word ends at, ascending.
+    pub ends: Vec<u32>,
+    /// Number of observations of each word.
     pub size: Vec<u16>,
-    /// Turn as a binary angle.
+    /// Turn of each word as a binary angle.
     pub turn: Vec<i16>,
 }
 
-impl WordColumns {
-    /// Classes, sizes and turns of a range of entries, which must lie within them.
-    pub fn slice(&self, range: std::ops::Range<usize>) -> (&[u16], &[u16], &[i16]) {
-        (&self.class[range.clone()], &self.size[range.clone()], &self.turn[range])
-    }
-
-    fn append(&mut self, other: &Self) {
-        self.class.extend_from_slice(&other.class);
-        self.size.extend_from_slice(&other.size);
-        self.turn.extend_from_slice(&other.turn);
-    }
-
-    fn push(&mut self, word: Syllables) {
-        self.class.push(word.class);
-        self.size.push(word.size);
-        self.turn.push(word.turn);
-    }
-}
-
 impl LevelColumns {
+    /// Number of words of this level.
+    pub fn num_words(&self) -> usize {
+        self.ends.len()
+    }
+
+    /// The words of one class; `None` if the class is beyond all that occur.
+    pub fn of_class(&self, class: u16) -> Option<&ClassColumns> {
+        self.by_class.get(usize::from(class))
+    }
+
     fn push_absent(&mut self) {
-        self.by_node.push(Syllables { class: ABSENT, size: 0, turn: 0 });
+        self.by_node.class.push(ABSENT);
+        self.by_node.size.push(0);
+        self.by_node.turn.push(0);
         self.index.push(u32::MAX);
     }
 
     fn append(&mut self, other: &Self, first_node: usize) {
         let first_word = self.ends.len() as u32;
-        self.by_node.append(&other.by_node);
-        self.in_row.append(&other.in_row);
-        self.ends.extend(other.ends.iter().map(|end| end + first_node as u32));
+        let moved = |end: &u32| end + first_node as u32;
+        self.by_node.class.extend_from_slice(&other.by_node.class);
+        self.by_node.size.extend_from_slice(&other.by_node.size);
+        self.by_node.turn.extend_from_slice(&other.by_node.turn);
+        self.ends.extend(other.ends.iter().map(moved));
         // The mark of a node without a word stays as it is.
         let renumbered = |&index: &u32| if index == u32::MAX { index } else { index + first_word };
         self.index.extend(other.index.iter().map(renumbered));
+        self.make_room_for_classes(other.by_class.len());
+        for (words, others) in self.by_class.iter_mut().zip(&other.by_class) {
+            words.ends.extend(others.ends.iter().map(moved));
+            words.size.extend_from_slice(&others.size);
+            words.turn.extend_from_slice(&others.turn);
+        }
     }
 
     fn set(&mut self, node: usize, word: &Word) {
@@ -109,9 +116,19 @@ impl LevelColumns {
         self.by_node.class[node] = syllables.class;
         self.by_node.size[node] = syllables.size;
         self.by_node.turn[node] = syllables.turn;
-        self.in_row.push(syllables);
         self.index[node] = word.id.index;
         self.ends.push(node as u32);
+        let class = usize::from(syllables.class);
+        self.make_room_for_classes(class + 1);
+        let alike = &mut self.by_class[class];
+        alike.ends.push(node as u32);
+        alike.size.push(syllables.size);
+        alike.turn.push(syllables.turn);
+    }
+
+    fn make_room_for_classes(&mut self, num_classes: usize) {
+        let num_classes = num_classes.max(self.by_class.len());
+        self.by_class.resize_with(num_classes, ClassColumns::default);
     }
 }
 
@@ -205,7 +222,9 @@ impl Lattice {
             (0..self.num_nodes()).for_each(|_| columns.push_absent());
             self.levels.push(columns);
         }
-        if self.levels[level].ends.len() != word.id.index as usize {
+        let columns = &self.levels[level];
+        let is_in_order = columns.ends.last().is_none_or(|&before| (before as usize) < end);
+        if columns.ends.len() != word.id.index as usize || !is_in_order {
             return Err(misplaced);
         }
         self.levels[level].set(end, word);
@@ -304,6 +323,10 @@ mod tests {
     fn words_that_are_no_text_are_refused() {
         let misplaced = [word(0, 0, (0, 4)), word(0, 1, (5, 9)), word(1, 0, (0, 9))];
         assert_eq!(Lattice::from_words(&misplaced).unwrap_err(), LatticeError::Span { level: 1, index: 0 });
+        // Two words of one level, the one that ends first last.
+        let plain = (0..5).map(|index| word(0, index, (index * 5, index * 5 + 4)));
+        let swapped: Vec<Word> = plain.chain([word(1, 0, (5, 19)), word(1, 1, (0, 14))]).collect();
+        assert_eq!(Lattice::from_words(&swapped).unwrap_err(), LatticeError::Span { level: 1, index: 1 });
         assert_eq!(Lattice::from_words(&[word(0, 1, (0, 4))]).unwrap_err(), LatticeError::Gap { index: 0 });
     }
 }

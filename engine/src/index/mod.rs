@@ -15,7 +15,7 @@ mod tolerance;
 #[cfg(test)]
 mod search_tests;
 
-pub use lattice::{Lattice, LatticeError, LevelColumns, WordColumns, num_nodes_covered};
+pub use lattice::{ClassColumns, Lattice, LatticeError, LevelColumns, num_nodes_covered};
 pub use occurrence::OccurrenceIndex;
 pub use packed::{STORED_WORD_BYTES, store_words};
 pub use pattern::{TextQuery, WordConstraint};

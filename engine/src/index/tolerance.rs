@@ -126,12 +126,17 @@ pub struct WordWindow {
 }
 
 impl WordWindow {
-    /// Whether a word lies in the box. Branch-free, so that loops over columns of words become vector code.
+    /// Whether a word lies in the box.
     #[inline]
     pub fn contains(&self, word: &Syllables) -> bool {
-        (word.class == self.class)
-            & (word.size.wrapping_sub(self.size_min) <= self.size_span)
-            & ((word.turn.wrapping_sub(self.turn_min) as u16) <= self.turn_span)
+        (word.class == self.class) & self.contains_of_class(word.size, word.turn)
+    }
+
+    /// Whether a word of the window's class lies in the box. Branch-free, for loops over columns of words.
+    #[inline]
+    pub fn contains_of_class(&self, size: u16, turn: i16) -> bool {
+        (size.wrapping_sub(self.size_min) <= self.size_span)
+            & ((turn.wrapping_sub(self.turn_min) as u16) <= self.turn_span)
     }
 }
 

@@ -151,7 +151,7 @@ fn word_of(text: &Lattice, id: WordId) -> Option<Syllables> {
 }
 
 fn count_words(text: &Lattice, level: usize) -> u64 {
-    text.level(level).map_or(0, |columns| columns.ends.len() as u64)
+    text.level(level).map_or(0, |columns| columns.num_words() as u64)
 }
 
 #[cfg(test)]

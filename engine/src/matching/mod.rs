@@ -7,6 +7,7 @@ mod config;
 mod evidence;
 mod rows;
 mod run_match;
+mod trace;
 
 #[cfg(test)]
 mod chain_tests;

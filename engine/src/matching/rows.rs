@@ -7,13 +7,13 @@
 //! level l reaches the rows l + 2 above. Read backwards, an earlier word is entered at its last node and left at its
 //! first one; its column is then its first node and the shift goes the other way.
 //!
-//! A row costs a few vector instructions per eight pairs of words and keeps no pointers: a found chain is traced by
-//! filling a small block of rows again.
+//! Two words can only match within one class, and words without a match leave nothing behind. So a word is compared
+//! with the words of its class, which stand in a row, and a row remembers which of its entries are not 0. No pointers
+//! are kept: [`super::trace`] finds the way back when a chain is wanted.
 
 use std::collections::VecDeque;
-use std::ops::Range;
 
-use crate::index::{Lattice, LevelColumns, Syllables, WordTolerance, WordWindow, num_nodes_covered};
+use crate::index::{Lattice, WordTolerance, WordWindow, num_nodes_covered};
 use crate::text::Direction;
 
 /// What a dynamic programme compares.
@@ -82,32 +82,28 @@ impl Comparison<'_> {
     }
 }
 
-/// Rows of L over a range of columns, the newest last.
+/// The last rows of L, as many as the longest word reaches back.
 #[derive(Clone, Debug)]
 pub(super) struct Rows {
-    max_level: usize,
-    num_kept: usize,
-    first_column: usize,
+    padding: usize,
     num_columns: usize,
     next_node: usize,
-    rows: VecDeque<Vec<i16>>,
-    blank: Vec<i16>,
+    rows: VecDeque<Row>,
+}
+
+/// L at one node of the later text.
+#[derive(Clone, Debug, Default)]
+struct Row {
+    /// One value per column and as many zeros at both ends as the longest word reaches.
+    lengths: Vec<u32>,
+    /// Where they are not 0, in no order.
+    filled: Vec<u32>,
 }
 
 impl Rows {
-    /// No rows yet: the first will be that of `first_node`. At most `num_kept` rows are remembered, and no fewer than
-    /// the longest word reaches back.
-    pub fn new(max_level: usize, first_node: usize, columns: Range<usize>, num_kept: usize) -> Self {
-        let padding = num_nodes_covered(max_level);
-        Self {
-            max_level,
-            num_kept: num_kept.max(padding + 1),
-            first_column: columns.start,
-            num_columns: columns.len(),
-            next_node: first_node,
-            rows: VecDeque::new(),
-            blank: vec![0; columns.len() + 2 * padding],
-        }
+    /// No rows yet: the first will be that of node 0.
+    pub fn new(max_level: usize) -> Self {
+        Self { padding: num_nodes_covered(max_level), num_columns: 0, next_node: 0, rows: VecDeque::new() }
     }
 
     /// The node whose row comes next.
@@ -124,151 +120,100 @@ impl Rows {
 
     /// Makes room for an earlier text that has grown at its end.
     pub fn grow_columns(&mut self, num_columns: usize) {
-        let num_columns = num_columns.max(self.num_columns);
-        let length = num_columns + 2 * self.padding();
-        self.rows.iter_mut().for_each(|row| row.resize(length, 0));
-        self.blank.resize(length, 0);
-        self.num_columns = num_columns;
+        self.num_columns = num_columns.max(self.num_columns);
+        let length = self.num_columns + 2 * self.padding;
+        self.rows.iter_mut().for_each(|row| row.lengths.resize(length, 0));
     }
 
-    /// L at a node of the later text, one value per column; `None` when that row is not remembered.
-    pub fn row(&self, node: usize) -> Option<&[i16]> {
-        let padding = self.padding();
-        self.padded_row(node).map(|row| &row[padding..padding + self.num_columns])
-    }
-
-    /// Fills the row of the next node, given what matches the words that end there ([`Comparison::windows`]); returns
-    /// the longest chain in it.
-    pub fn push(&mut self, texts: &Comparison, windows: &[Option<WordWindow>]) -> i16 {
-        let node = self.next_node;
-        let mut longest = 0;
-        let mut row = if self.rows.len() >= self.num_kept { self.rows.pop_front() } else { None }
-            .unwrap_or_else(|| self.blank.clone());
-        row.fill(0);
-        for (later_level, window) in windows.iter().take(self.max_level + 1).enumerate() {
-            let Some(window) = window else { continue };
-            let covered = num_nodes_covered(later_level);
-            let num_allowed = texts.num_allowed_nodes(node + 1 - covered);
-            let previous = node.checked_sub(covered).and_then(|previous| self.padded_row(previous));
-            let previous = previous.unwrap_or(&self.blank);
-            for earlier_level in 0..=self.max_level {
-                let Some(words) = texts.earlier.level(earlier_level) else { continue };
-                let longest_here = self.extend_by(
-                    texts.direction,
-                    (words, earlier_level),
-                    window,
-                    num_allowed,
-                    (previous, &mut row),
-                );
-                longest = longest_here.max(longest);
-            }
-        }
+    /// Begins the row of the next node, without any chain.
+    pub fn begin_row(&mut self) {
+        let oldest = if self.rows.len() > self.padding { self.rows.pop_front() } else { None };
+        let mut row = oldest.unwrap_or_default();
+        row.filled.drain(..).for_each(|place| row.lengths[place as usize] = 0);
+        row.lengths.resize(self.num_columns + 2 * self.padding, 0);
         self.rows.push_back(row);
         self.next_node += 1;
-        longest
     }
 
-    fn padding(&self) -> usize {
-        num_nodes_covered(self.max_level)
-    }
-
-    fn padded_row(&self, node: usize) -> Option<&Vec<i16>> {
-        let age = self.next_node.checked_sub(node + 1)?;
-        self.rows.len().checked_sub(age + 1).map(|position| &self.rows[position])
-    }
-
-    /// Lets one word of the later text extend all chains by words of one level of the earlier text; returns the
-    /// longest chain in the row.
-    fn extend_by(
-        &self,
+    /// Lets a word of `later_level` that ends at the newest row's node extend all chains by words of `earlier_level`
+    /// that match it and end at the nodes `ends`.
+    pub fn extend_by(
+        &mut self,
         direction: Direction,
-        (words, level): (&LevelColumns, usize),
+        ends: &[u32],
+        later_level: usize,
+        earlier_level: usize,
+    ) {
+        let Some(mut row) = self.rows.pop_back() else { return };
+        let covered = num_nodes_covered(earlier_level);
+        let (column_of_first, previous_of_first) = match direction {
+            Direction::Same => (self.padding, self.padding - covered),
+            Direction::Opposite => (self.padding + 1 - covered, self.padding + 1),
+        };
+        // The newest row is taken out, so the row before it is now the last.
+        let previous = self.rows.len().checked_sub(num_nodes_covered(later_level));
+        let previous = previous.map_or(&[][..], |idx| &self.rows[idx].lengths);
+        for &end in ends {
+            let before = previous.get(end as usize + previous_of_first).copied().unwrap_or(0);
+            let place = end as usize + column_of_first;
+            let length = &mut row.lengths[place];
+            if *length == 0 {
+                row.filled.push(place as u32);
+            }
+            *length = (before + 1).max(*length);
+        }
+        self.rows.push_back(row);
+    }
+
+    /// Columns of the newest row at which chains of at least `min_words` words end, and their words; ascending.
+    pub fn ends_of_at_least(&self, min_words: u32) -> Vec<(usize, u32)> {
+        let Some(row) = self.rows.back() else { return Vec::new() };
+        let lengths = row.filled.iter().map(|&place| (place as usize, row.lengths[place as usize]));
+        let long = lengths.filter(|&(_, length)| length >= min_words);
+        let mut ends: Vec<_> = long.map(|(place, length)| (place - self.padding, length)).collect();
+        ends.sort_unstable();
+        ends
+    }
+}
+
+/// Finds the words of the earlier text that lie in a window; keeps its memory from one search to the next.
+#[derive(Clone, Debug, Default)]
+pub(super) struct WordSearch {
+    /// 1 for each word that matches, else 0.
+    is_match: Vec<u8>,
+    ends: Vec<u32>,
+}
+
+impl WordSearch {
+    /// The nodes at which the matching words of a level end, ascending; only words that end at the first
+    /// `num_allowed` nodes count.
+    pub fn matching_ends(
+        &mut self,
+        earlier: &Lattice,
+        level: usize,
         window: &WordWindow,
         num_allowed: usize,
-        (previous, row): (&[i16], &mut [i16]),
-    ) -> i16 {
-        let covered = num_nodes_covered(level);
-        let end_of_first = match direction {
-            Direction::Same => self.first_column,
-            Direction::Opposite => self.first_column + covered - 1,
+    ) -> &[u32] {
+        self.is_match.clear();
+        self.ends.clear();
+        let Some(words) = earlier.level(level).and_then(|words| words.of_class(window.class)) else {
+            return &[];
         };
-        let end_of_last = (end_of_first + self.num_columns).min(num_allowed);
-        let Some(length) = end_of_last.checked_sub(end_of_first) else { return 0 };
-        let padding = self.padding();
-        let previous_start = match direction {
-            Direction::Same => padding - covered,
-            Direction::Opposite => padding + covered,
-        };
-        let row = &mut row[padding..padding + length];
-        let previous = &previous[previous_start..previous_start + length];
-        if level == 0 {
-            let words = words.by_node.slice(end_of_first..end_of_last);
-            return extend_chains(row, previous, words, window);
-        }
-        // Alternative words end at few nodes.
-        let first_word = words.ends.partition_point(|&end| (end as usize) < end_of_first);
-        let last_word = words.ends.partition_point(|&end| (end as usize) < end_of_last);
-        let ends = &words.ends[first_word..last_word];
-        let mut longest = 0;
-        let (class, size, turn) = words.in_row.slice(first_word..last_word);
-        for (((&end, &class), &size), &turn) in ends.iter().zip(class).zip(size).zip(turn) {
-            if class == window.class && window.contains(&Syllables { class, size, turn }) {
-                let column = end as usize - end_of_first;
-                row[column] = previous[column].saturating_add(1).max(row[column]);
-                longest = row[column].max(longest);
+        let num_words = words.ends.partition_point(|&end| (end as usize) < num_allowed);
+        let ends = &words.ends[..num_words];
+        // First all comparisons, which become vector code, then the few words that match, eight at a look.
+        let syllables = words.size[..num_words].iter().zip(&words.turn[..num_words]);
+        self.is_match.extend(syllables.map(|(&size, &turn)| u8::from(window.contains_of_class(size, turn))));
+        let (groups, rest) = self.is_match.as_chunks::<8>();
+        for (group, ends) in groups.iter().zip(ends.chunks_exact(8)) {
+            let mut matches = u64::from_le_bytes(*group);
+            while matches != 0 {
+                self.ends.push(ends[matches.trailing_zeros() as usize / 8]);
+                matches &= matches - 1;
             }
         }
-        longest
+        let rest = rest.iter().zip(&ends[num_words - rest.len()..]);
+        self.ends.extend(rest.filter(|(is_match, _)| **is_match != 0).map(|(_, &end)| end));
+        &self.ends
     }
-}
-
-/// Classes, sizes and turns of words.
-type Columns<'a> = (&'a [u16], &'a [u16], &'a [i16]);
-
-/// Words compared at once: two vector registers of every processor that this is built for.
-const LANES: usize = 16;
-
-/// One word against a column of words: where they match, a chain grows by one. All slices have the same length.
-/// Returns the longest chain in the row.
-///
-/// Kept out of its caller, whose variables would take the registers that the window should stay in.
-#[inline(never)]
-fn extend_chains(
-    row: &mut [i16],
-    previous: &[i16],
-    (class, size, turn): Columns,
-    window: &WordWindow,
-) -> i16 {
-    let mut longest = [0; LANES];
-    let (rows, row_rest) = row.as_chunks_mut::<LANES>();
-    let (befores, before_rest) = previous.as_chunks::<LANES>();
-    let (classes, class_rest) = class.as_chunks::<LANES>();
-    let (sizes, size_rest) = size.as_chunks::<LANES>();
-    let (turns, turn_rest) = turn.as_chunks::<LANES>();
-    let words = classes.iter().zip(sizes).zip(turns);
-    for ((row, before), ((class, size), turn)) in rows.iter_mut().zip(befores).zip(words) {
-        for lane in 0..LANES {
-            row[lane] = extended(row[lane], before[lane], (class[lane], size[lane], turn[lane]), window);
-            longest[lane] = row[lane].max(longest[lane]);
-        }
-    }
-    let words = class_rest.iter().zip(size_rest).zip(turn_rest);
-    for ((length, &before), ((&class, &size), &turn)) in row_rest.iter_mut().zip(before_rest).zip(words) {
-        *length = extended(*length, before, (class, size, turn), window);
-        longest[0] = longest[0].max(*length);
-    }
-    longest.into_iter().fold(0, i16::max)
-}
-
-/// The chain length at a pair of words: that before it and one more where the words match, if that is longer.
-///
-/// Arithmetic on masks instead of conditions, because a condition would be compiled to a jump and the loop around it
-/// would no longer be vector code.
-#[inline(always)]
-fn extended(length: i16, before: i16, (class, size, turn): (u16, u16, i16), window: &WordWindow) -> i16 {
-    let off_class = class ^ window.class;
-    let off_size = size.wrapping_sub(window.size_min).saturating_sub(window.size_span);
-    let off_turn = (turn.wrapping_sub(window.turn_min) as u16).saturating_sub(window.turn_span);
-    let mask = -i16::from(off_class | off_size | off_turn == 0);
-    (before.saturating_add(1) & mask).max(length)
 }
