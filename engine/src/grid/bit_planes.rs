@@ -15,23 +15,31 @@ pub(super) fn filled(occupancy: u8) -> Planes {
     std::array::from_fn(|plane| if occupancy >> plane & 1 == 1 { u64::MAX } else { 0 })
 }
 
-/// Takes one from every cell in `mask`, not below 0.
-pub(super) fn decrement(planes: &mut Planes, mask: u64) {
-    let mut borrow = mask & (planes[0] | planes[1] | planes[2] | planes[3]);
-    for plane in planes {
+/// Takes `amount`, at most 15, from every cell in `mask`, not below 0.
+pub(super) fn subtract(planes: &mut Planes, mask: u64, amount: u8) {
+    let mut borrow = 0;
+    for (bit, plane) in planes.iter_mut().enumerate() {
+        let taken = if amount >> bit & 1 == 1 { mask } else { 0 };
         let old = *plane;
-        *plane = old ^ borrow;
-        borrow &= !old;
+        *plane = old ^ taken ^ borrow;
+        borrow = (!old & (taken | borrow)) | (taken & borrow);
+    }
+    for plane in planes {
+        *plane &= !borrow;
     }
 }
 
-/// Adds one to every cell in `mask`, not above 15.
-pub(super) fn increment(planes: &mut Planes, mask: u64) {
-    let mut carry = mask & !(planes[0] & planes[1] & planes[2] & planes[3]);
-    for plane in planes {
+/// Adds `amount`, at most 15, to every cell in `mask`, not above 15.
+pub(super) fn add(planes: &mut Planes, mask: u64, amount: u8) {
+    let mut carry = 0;
+    for (bit, plane) in planes.iter_mut().enumerate() {
+        let added = if amount >> bit & 1 == 1 { mask } else { 0 };
         let old = *plane;
-        *plane = old ^ carry;
-        carry &= old;
+        *plane = old ^ added ^ carry;
+        carry = (old & (added | carry)) | (added & carry);
+    }
+    for plane in planes {
+        *plane |= carry;
     }
 }
 
@@ -70,16 +78,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_like_numbers_for_every_occupancy() {
-        for occupancy in 0..16u8 {
+    fn counts_like_numbers_for_every_occupancy_and_amount() {
+        for (occupancy, amount) in
+            (0..16u8).flat_map(|occupancy| (0..16u8).map(move |amount| (occupancy, amount)))
+        {
             let start = filled(occupancy);
             let (mut up, mut down, mut put) = (start, start, start);
-            increment(&mut up, 1 << 63);
-            decrement(&mut down, 1 << 63);
-            set(&mut put, 1 << 63, 9);
-            assert_eq!(get(&up, 63), (occupancy + 1).min(15));
-            assert_eq!(get(&down, 63), occupancy.saturating_sub(1));
-            assert_eq!(get(&put, 63), 9);
+            add(&mut up, 1 << 63, amount);
+            subtract(&mut down, 1 << 63, amount);
+            set(&mut put, 1 << 63, amount);
+            assert_eq!(get(&up, 63), (occupancy + amount).min(15));
+            assert_eq!(get(&down, 63), occupancy.saturating_sub(amount));
+            assert_eq!(get(&put, 63), amount);
             for planes in [up, down, put] {
                 assert_eq!(get(&planes, 0), occupancy, "a cell outside the mask changed");
             }

@@ -1,8 +1,8 @@
 //! The update rule of the local map (thesis Algorithm 2.2, SPEC 3.1).
 //!
 //! The cells that a scan frees and those it hits are collected as bits first and applied to 64 cells at a time. In a
-//! sector of the view that belongs to one beam, the freed cells are simply the nearest ones; only where beams meet is
-//! the beam of a cell looked up.
+//! sector of the view, the nearest cells are freed by whatever beams meet it; only for the cells about the readings is
+//! the beam looked up.
 
 use std::f64::consts::TAU;
 
@@ -66,39 +66,68 @@ impl Laser {
     }
 
     fn set_limits(&mut self, ranges_m: &[f32], config: &LocalMapConfig) {
-        let (num_ranges, radius) = (self.geometry.num_ranges, config.radius_cells());
-        for beam in 0..num_ranges {
-            let index = if self.geometry.angle_increment_rad > 0.0 { beam } else { num_ranges - 1 - beam };
-            self.limits[beam] = ranges_m
-                .get(index)
-                .map(|&range_m| limits_of(range_m, radius, &self.geometry, config))
-                .unwrap_or_default();
+        let scale = RangeScale::new(&self.geometry, config);
+        let num_ranges = self.geometry.num_ranges;
+        let read = ranges_m.iter().map(|&range_m| scale.limits_of(range_m));
+        let limits = read.chain(std::iter::repeat(BeamLimits::default())).take(num_ranges);
+        if self.geometry.angle_increment_rad > 0.0 {
+            self.limits.iter_mut().zip(limits).for_each(|(old, new)| *old = new);
+        } else {
+            self.limits[..num_ranges].iter_mut().rev().zip(limits).for_each(|(old, new)| *old = new);
         }
     }
 }
 
-/// What a reading says about the cells of its beam.
-fn limits_of(range_m: f32, radius: f64, geometry: &ScanGeometry, config: &LocalMapConfig) -> BeamLimits {
-    let radius_end = (radius * radius) as u32 + 1;
-    let free_up_to = |free_end: u32| BeamLimits { free_end, reach: free_end, ..BeamLimits::default() };
-    if range_m <= 0.0 {
-        // A reading of nothing is a fault of the sensor; it says neither free nor occupied.
-        return BeamLimits::default();
-    }
-    if !geometry.is_return(range_m) {
+/// Turns readings into limits in cells.
+struct RangeScale {
+    range_max_m: f64,
+    resolution_m: f64,
+    hit_tolerance: f64,
+    radius: f64,
+    /// What a reading from beyond the radius says.
+    all_free: BeamLimits,
+    /// What a beam without return says.
+    no_return: BeamLimits,
+}
+
+impl RangeScale {
+    fn new(geometry: &ScanGeometry, config: &LocalMapConfig) -> Self {
+        let free_within = |free_end: u32| BeamLimits { free_end, reach: free_end, ..BeamLimits::default() };
+        let radius = config.radius_cells();
+        let all_free = free_within((radius * radius) as u32 + 1);
         let cleared = geometry.range_max_m / config.resolution_m;
-        return free_up_to(if cleared > radius { radius_end } else { rounded_up(cleared * cleared) });
+        let no_return = if cleared > radius { all_free } else { free_within(rounded_up(cleared * cleared)) };
+        let (range_max_m, resolution_m) = (geometry.range_max_m, config.resolution_m);
+        Self {
+            range_max_m,
+            resolution_m,
+            hit_tolerance: config.hit_tolerance_cells,
+            radius,
+            all_free,
+            no_return,
+        }
     }
-    let range = f64::from(range_m) / config.resolution_m;
-    let (near, far) = (range - config.hit_tolerance_cells, range + config.hit_tolerance_cells);
-    if near > radius {
-        return free_up_to(radius_end);
+
+    /// What a reading says about the cells of its beam.
+    fn limits_of(&self, range_m: f32) -> BeamLimits {
+        if range_m <= 0.0 {
+            // A reading of nothing is a fault of the sensor; it says neither free nor occupied.
+            return BeamLimits::default();
+        }
+        // Not a number, infinite or the sensor's maximum.
+        if !(f64::from(range_m) < self.range_max_m) || range_m == f32::INFINITY {
+            return self.no_return;
+        }
+        let range = f64::from(range_m) / self.resolution_m;
+        let (near, far) = ((range - self.hit_tolerance).max(0.0), range + self.hit_tolerance);
+        if near > self.radius {
+            return self.all_free;
+        }
+        let free_end = rounded_up(near * near);
+        let hit_end = rounded_up((far * far).min(self.radius * self.radius));
+        let hit_begin = if range < self.hit_tolerance { 0 } else { (near * near) as u32 + 1 };
+        BeamLimits { free_end, hit_begin, hit_end, reach: free_end.max(hit_end) }
     }
-    let near_squared = near.max(0.0).powi(2);
-    let free_end = rounded_up(near_squared);
-    let hit_end = rounded_up((far * far).min(radius * radius));
-    let hit_begin = if near < 0.0 { 0 } else { near_squared as u32 + 1 };
-    BeamLimits { free_end, hit_begin, hit_end, reach: free_end.max(hit_end) }
 }
 
 /// The smallest integer not below a number that is not negative.
@@ -129,19 +158,19 @@ impl LocalMap {
         }
     }
 
-    fn unmark_beyond_radius(&self, seen: &mut Seen, laser: Cell, robot: Cell) {
+    fn unmark_beyond_radius(&self, seen: &mut [Seen], laser: Cell, robot: Cell) {
         for (start, len) in self.outside(laser, robot) {
             for_each_word(start, len, self.index_mask(), |word, mask| {
-                seen.free[word] &= !mask;
-                seen.hit[word] &= !mask;
+                seen[word][FREE] &= !mask;
+                seen[word][HIT] &= !mask;
             });
         }
     }
 
     /// Collects the cells before and around the readings, seen from the laser's cell.
-    fn cells_seen(&self, laser_cell: Cell, first_edge: u32) -> Seen {
+    fn cells_seen(&self, laser_cell: Cell, first_edge: u32) -> Vec<Seen> {
         // Made anew for each scan: kept, it would be a good part of what an open run weighs.
-        let mut seen = Seen::new(self.num_words());
+        let mut seen = vec![[0; 2]; self.num_words()];
         let (base, index_mask, side) = (self.index(laser_cell) as i32, self.index_mask(), self.side());
         // A quarter turn maps (dx, dy) to (−dy, dx); on the helix a column counts 1 and a row counts `side`.
         let quarter_turns = [(1, side), (side, -1), (-1, -side), (-side, 1)];
@@ -156,93 +185,46 @@ impl LocalMap {
                 base.wrapping_add(i32::from(cell.dx) * per_dx + i32::from(cell.dy) * per_dy) as usize
                     & index_mask
             };
-            let cells = self.view.sector(sector_of_quadrant);
             let from_edge = (sector as u32).wrapping_mul(SECTOR_WIDTH).wrapping_sub(first_edge);
             let beams =
                 (self.laser.beam_at(from_edge), self.laser.beam_at(from_edge.wrapping_add(SECTOR_WIDTH - 1)));
-            if beams.0 == beams.1 {
-                seen.mark_beam(cells, &self.laser.limits[beams.0], bit_of);
-            } else {
-                seen.mark_beams(cells, &self.laser, beams, from_edge, bit_of);
+            let (free_for_all, reach) = common_limits(&self.laser.limits, beams);
+            let (free_cells, others) = self.view.split_sector(sector_of_quadrant, free_for_all);
+            let mut free = |cell: &ViewCell| {
+                let bit = bit_of(cell);
+                seen[bit >> 6][FREE] |= 1 << (bit & 63);
+            };
+            // The near half beside the far one: neighbours share words, and each write would wait for the last.
+            let (near, far) = free_cells.split_at(free_cells.len() / 2);
+            near.iter().zip(far).for_each(|(near, far)| {
+                free(near);
+                free(far);
+            });
+            far[near.len()..].iter().for_each(free);
+            for cell in others.iter().take_while(|cell| u32::from(cell.squared) < reach) {
+                let (bit, squared) = (bit_of(cell), u32::from(cell.squared));
+                let beam = self.laser.beam_at(from_edge.wrapping_add(cell.angle_in_sector));
+                let limits = &self.laser.limits[beam];
+                // Without branches, as nothing foretells the outcome about a reading.
+                let is_free = squared < limits.free_end;
+                let is_hit = !is_free & (squared >= limits.hit_begin) & (squared < limits.hit_end);
+                seen[bit >> 6][usize::from(is_hit)] |= u64::from(is_free | is_hit) << (bit & 63);
             }
         }
         seen
     }
 }
 
-/// Cells that the scan at hand found free, and hit, as bits on the map's helix; empty between scans.
-#[derive(Clone, Debug)]
-pub(super) struct Seen {
-    pub free: Vec<u64>,
-    pub hit: Vec<u64>,
-}
+/// Which of 64 cells of the map's helix the scan at hand found free ([`FREE`]), and hit ([`HIT`]).
+pub(super) type Seen = [u64; 2];
 
-impl Seen {
-    pub fn new(num_words: usize) -> Self {
-        Self { free: vec![0; num_words], hit: vec![0; num_words] }
-    }
-
-    /// Marks the cells of a sector that lies within one beam.
-    #[inline]
-    fn mark_beam(&mut self, cells: &[ViewCell], limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
-        let mut rest = cells.iter();
-        for cell in rest.by_ref() {
-            if cell.squared() >= limits.free_end {
-                mark_hit(&mut self.hit, cell, limits, &bit_of);
-                break;
-            }
-            insert(&mut self.free, bit_of(cell));
-        }
-        for cell in rest {
-            if cell.squared() >= limits.hit_end {
-                break;
-            }
-            mark_hit(&mut self.hit, cell, limits, &bit_of);
-        }
-    }
-
-    /// Marks the cells of a sector in which beams meet; the sector begins `from_edge` behind the first edge.
-    #[inline]
-    fn mark_beams(
-        &mut self,
-        cells: &[ViewCell],
-        laser: &Laser,
-        (first, last): (usize, usize),
-        from_edge: u32,
-        bit_of: impl Fn(&ViewCell) -> usize,
-    ) {
-        let (free_for_all, reach) = common_limits(&laser.limits, first, last);
-        for cell in cells {
-            let squared = cell.squared();
-            if squared < free_for_all {
-                insert(&mut self.free, bit_of(cell));
-                continue;
-            }
-            if squared >= reach {
-                break;
-            }
-            let limits = &laser.limits[laser.beam_at(from_edge.wrapping_add(cell.angle_in_sector()))];
-            if squared < limits.free_end {
-                insert(&mut self.free, bit_of(cell));
-            } else {
-                mark_hit(&mut self.hit, cell, limits, &bit_of);
-            }
-        }
-    }
-}
-
-fn insert(bits: &mut [u64], bit: usize) {
-    bits[bit >> 6] |= 1 << (bit & 63);
-}
-
-fn mark_hit(hit: &mut [u64], cell: &ViewCell, limits: &BeamLimits, bit_of: impl Fn(&ViewCell) -> usize) {
-    if (limits.hit_begin..limits.hit_end).contains(&cell.squared()) {
-        insert(hit, bit_of(cell));
-    }
-}
+/// Cells before the readings.
+pub(super) const FREE: usize = 0;
+/// Cells around the readings.
+pub(super) const HIT: usize = 1;
 
 /// What all beams of a sector free, and how far the farthest goes; a sector may straddle the first edge.
-fn common_limits(limits: &[BeamLimits], first: usize, last: usize) -> (u32, u32) {
+fn common_limits(limits: &[BeamLimits], (first, last): (usize, usize)) -> (u32, u32) {
     let fold = |beams: &[BeamLimits], start: (u32, u32)| {
         beams.iter().fold(start, |(free, reach), beam| (free.min(beam.free_end), reach.max(beam.reach)))
     };

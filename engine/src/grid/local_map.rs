@@ -4,11 +4,13 @@
 //! wider than the map. A cell that is `dx`, `dy` away is then one addition away, and moving the robot copies
 //! nothing: cells that fall out of the radius are set back to unknown.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::bit_planes::{self, Planes};
 use super::field_of_view::FieldOfView;
-use super::himm::{Laser, Seen};
+use super::himm::{FREE, HIT, Laser, Seen};
 use super::{Cell, LocalMapConfig, OccupancyRows};
 use crate::scan::ScanGeometry;
 
@@ -18,7 +20,7 @@ use crate::scan::ScanGeometry;
 pub struct LocalMap {
     pub(super) config: LocalMapConfig,
     pub(super) laser: Laser,
-    pub(super) view: FieldOfView,
+    pub(super) view: Arc<FieldOfView>,
     /// The cell the robot stands on; none before the first scan.
     pub(super) robot: Option<Cell>,
     side_log2: u32,
@@ -40,7 +42,7 @@ impl LocalMap {
         Self {
             config: config.clone(),
             laser: Laser::new(geometry),
-            view: FieldOfView::new(radius),
+            view: FieldOfView::shared(radius),
             robot: None,
             side_log2,
             words: vec![bit_planes::filled(config.initial); num_words],
@@ -145,16 +147,13 @@ impl LocalMap {
     }
 
     /// Applies what a scan saw.
-    pub(super) fn apply(&mut self, seen: &Seen) {
-        for (planes, (&free, &hit)) in self.words.iter_mut().zip(seen.free.iter().zip(&seen.hit)) {
-            if free | hit == 0 {
-                continue;
+    pub(super) fn apply(&mut self, seen: &[Seen]) {
+        for (planes, seen) in self.words.iter_mut().zip(seen) {
+            if seen[FREE] != 0 {
+                bit_planes::subtract(planes, seen[FREE], self.config.free_decrement);
             }
-            for _ in 0..self.config.free_decrement {
-                bit_planes::decrement(planes, free);
-            }
-            for _ in 0..self.config.hit_increment {
-                bit_planes::increment(planes, hit);
+            if seen[HIT] != 0 {
+                bit_planes::add(planes, seen[HIT], self.config.hit_increment);
             }
         }
     }

@@ -21,6 +21,7 @@ use super::bit_window::{
     span, spread,
 };
 use super::kernel_rows::KernelRows;
+use super::openings::Openings;
 
 /// Cells per side of the square in which a gap may be bridged.
 const BRIDGE: usize = 8;
@@ -33,8 +34,8 @@ const FIRST_COLUMN: u64 = 0x0101_0101_0101_0101;
 pub(super) struct Fill {
     /// Kernel mass of the connected free cells, in [0, 1].
     pub density: f32,
-    /// How many of them have an unknown neighbour.
-    pub num_open: u32,
+    /// More of them than allowed have an unknown neighbour and hang together: an opening into the unknown.
+    pub has_opening: bool,
 }
 
 /// A disc that slides along rows of centres; owns the scratch words of one thread.
@@ -52,14 +53,19 @@ pub(super) struct DiscSweep<'a, const W: usize> {
     left: usize,
     num_reached: u32,
     num_open: u32,
+    /// Open cells that may hang together without being an opening.
+    most_open: u32,
+    /// Open cells in groups, while an opening is looked for.
+    openings: Openings,
     /// Reached cells, and cells of runs perhaps not reached yet, from which a flood goes on.
     stack: Vec<(usize, usize)>,
     runs: Vec<(usize, usize)>,
 }
 
 impl<'a, const W: usize> DiscSweep<'a, W> {
-    /// A sweep of a kernel whose disc must fit into `64 W` rows and columns.
-    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows) -> Self {
+    /// A sweep of a kernel whose disc must fit into `64 W` rows and columns; at most `most_open` open cells that hang
+    /// together are no opening.
+    pub fn new(planes: &'a BitPlanes, kernel: &'a KernelRows, most_open: u32) -> Self {
         let shape = DiscShape::new(kernel);
         Self {
             planes,
@@ -72,6 +78,8 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             left: 0,
             num_reached: 0,
             num_open: 0,
+            most_open,
+            openings: Openings::default(),
             stack: Vec::new(),
             runs: Vec::new(),
         }
@@ -95,7 +103,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             if is_free && !(was_free && can_slide && self.slide_to(arc)) {
                 self.flood(arc, can_slide);
             }
-            *fill = is_free.then(|| self.read());
+            *fill = is_free.then(|| self.read(arc, can_slide));
             was_free = is_free;
         }
     }
@@ -283,12 +291,39 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         }
     }
 
-    fn read(&self) -> Fill {
+    /// What the fill around `arc` comes to; `by_arcs` says whether it is kept by arcs.
+    fn read(&mut self, arc: usize, by_arcs: bool) -> Fill {
+        let has_opening = self.num_open > self.most_open && self.has_opening(arc, by_arcs);
         let density = self
             .kernel
             .mass_of_count(self.num_reached)
             .unwrap_or_else(|| self.kernel.mass(self.rows.iter().copied()));
-        Fill { density, num_open: self.num_open }
+        Fill { density, has_opening }
+    }
+
+    /// Whether enough open cells of the fill hang together.
+    fn has_opening(&mut self, arc: usize, by_arcs: bool) -> bool {
+        let radius = self.kernel.radius();
+        self.openings.clear();
+        if by_arcs {
+            for entered in arc - 2 * radius..=arc {
+                let open = and(&self.reach[entered], &self.arcs.entering_open[entered]);
+                if is_empty(&open) {
+                    continue;
+                }
+                // Rows of shorter chords have lost the cells that entered first.
+                let is_inside = |&row: &usize| entered + 2 * self.shape.half_chords[row] >= arc;
+                let cells = set_bits(&open).filter(is_inside);
+                self.openings.extend(cells.map(|row| (row, entered + self.shape.half_chords[row])));
+            }
+        } else {
+            let left = self.left + arc - radius;
+            for (row, reached) in self.rows.iter().enumerate() {
+                let open = and(reached, &self.planes.open_row(self.bottom + row, left));
+                self.openings.extend(set_bits(&open).map(|bit| (row, bit)));
+            }
+        }
+        self.openings.has_larger_than(self.most_open)
     }
 
     fn is_free(&self, row: usize, column: usize) -> bool {
@@ -344,8 +379,13 @@ mod tests {
     use crate::localization::grid_map::{CellState, GridMap};
     use crate::localization::kernel_rows::height;
 
-    /// Algorithm 3.1, cell by cell.
-    fn literal_fill(map: &GridMap, centre: (i64, i64), profile: KernelProfile, h: f64) -> Option<Fill> {
+    /// Algorithm 3.1, cell by cell, with the tolerance of SPEC section 3.
+    fn literal_fill(
+        map: &GridMap,
+        centre: (i64, i64),
+        (profile, h): (KernelProfile, f64),
+        most_open: u32,
+    ) -> Option<Fill> {
         if map.state(centre.0, centre.1) != CellState::Free {
             return None;
         }
@@ -355,7 +395,7 @@ mod tests {
             let d = (dx as f64).hypot(dy as f64);
             whole += if d < h { height(profile, d, h) } else { 0.0 };
         }
-        let mut num_open = 0;
+        let mut open = HashSet::new();
         let mut seen = HashSet::from([centre]);
         let mut queue = VecDeque::from([centre]);
         while let Some((x, y)) = queue.pop_front() {
@@ -368,10 +408,25 @@ mod tests {
             }
             mass += height(profile, d, h);
             let around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
-            num_open += u32::from(around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown));
+            if around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown) {
+                open.insert((x, y));
+            }
             queue.extend(around.iter().filter(|&&cell| seen.insert(cell)));
         }
-        Some(Fill { density: (mass / whole) as f32, num_open })
+        let mut largest = 0;
+        while let Some(&first) = open.iter().next() {
+            open.remove(&first);
+            let mut group = vec![first];
+            let mut num_cells = 0;
+            while let Some((x, y)) = group.pop() {
+                num_cells += 1;
+                for beside in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy))) {
+                    group.extend(open.remove(&beside).then_some(beside));
+                }
+            }
+            largest = largest.max(num_cells);
+        }
+        Some(Fill { density: (mass / whole) as f32, has_opening: largest > most_open })
     }
 
     /// Rooms with doors and clutter, and a part nobody has seen.
@@ -396,13 +451,18 @@ mod tests {
         map
     }
 
-    fn sweep_all(map: &GridMap, planes: &BitPlanes, kernel: &KernelRows) -> Vec<Option<Fill>> {
+    fn sweep_all(
+        map: &GridMap,
+        planes: &BitPlanes,
+        kernel: &KernelRows,
+        most_open: u32,
+    ) -> Vec<Option<Fill>> {
         let mut fills = vec![None; map.width() * map.height()];
         for (row, fills) in fills.chunks_exact_mut(map.width()).enumerate() {
             if kernel.radius() < 32 {
-                DiscSweep::<1>::new(planes, kernel).sweep(0, row as i64, fills);
+                DiscSweep::<1>::new(planes, kernel, most_open).sweep(0, row as i64, fills);
             } else {
-                DiscSweep::<2>::new(planes, kernel).sweep(0, row as i64, fills);
+                DiscSweep::<2>::new(planes, kernel, most_open).sweep(0, row as i64, fills);
             }
         }
         fills
@@ -418,15 +478,16 @@ mod tests {
                 let map = random_building(&mut rng, width, height);
                 let kernel = KernelRows::new(profile, h);
                 let planes = BitPlanes::new(&map, margin(&kernel));
-                let fills = sweep_all(&map, &planes, &kernel);
+                let most_open = rng.random_range(0..6);
+                let fills = sweep_all(&map, &planes, &kernel, most_open);
                 for (cell, fast) in fills.iter().enumerate() {
                     let cell = ((cell % width) as i64, (cell / width) as i64);
                     if h > 10.0 && rng.random_range(0..8) > 0 {
                         continue;
                     }
-                    match (fast, literal_fill(&map, cell, profile, h)) {
+                    match (fast, literal_fill(&map, cell, (profile, h), most_open)) {
                         (Some(fast), Some(slow)) => {
-                            assert_eq!(fast.num_open, slow.num_open, "h {h} at {cell:?}");
+                            assert_eq!(fast.has_opening, slow.has_opening, "h {h} at {cell:?}");
                             assert!(
                                 (fast.density - slow.density).abs() < 1e-5,
                                 "{fast:?} {slow:?} h {h} at {cell:?}"

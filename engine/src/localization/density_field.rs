@@ -47,8 +47,8 @@ pub struct DensityFieldConfig {
     pub profile: KernelProfile,
     /// Bandwidth of each kernel, metres; one to four (thesis 3.3.2.2: 15, 30 and 50 cells of 0.1 m).
     pub bandwidths_m: Vec<f64>,
-    /// Reached cells that may border on unknown ones while the density is still hard, as a share of the kernel's
-    /// perimeter; 0 is literal.
+    /// Reached cells that border on unknown ones and hang together are an opening, and the density is not hard, when
+    /// they are more than this share of the kernel's perimeter; 0 is literal.
     pub unknown_tolerance: f64,
     /// Where the gradient counts.
     pub gradient: GradientConfig,
@@ -281,12 +281,14 @@ fn kernel_codes(map: &GridMap, config: &DensityFieldConfig, bandwidth_m: f64) ->
 fn hard_densities(map: &GridMap, config: &DensityFieldConfig, bandwidth_cells: f64) -> Vec<f32> {
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
     let planes = BitPlanes::new(map, margin(&kernel));
+    let most_open = config.most_open(bandwidth_cells);
     let width = map.width();
     let mut densities = vec![f32::NAN; width * map.height()];
     densities.par_chunks_mut(width * ROWS_PER_TASK).enumerate().for_each(|(task, rows)| {
-        let fills = sweep(&planes, &kernel, (0, (task * ROWS_PER_TASK) as i64), (width, rows.len() / width));
+        let first_row = (task * ROWS_PER_TASK) as i64;
+        let fills = sweep((&planes, &kernel), most_open, (0, first_row), (width, rows.len() / width));
         for (density, fill) in rows.iter_mut().zip(&fills) {
-            *density = config.hard_density(fill, bandwidth_cells);
+            *density = hard_density(fill);
         }
     });
     densities
@@ -297,26 +299,26 @@ const ROWS_PER_TASK: usize = 16;
 
 /// Fills of a rectangle of centres, row by row.
 fn sweep(
-    planes: &BitPlanes,
-    kernel: &KernelRows,
+    disc: (&BitPlanes, &KernelRows),
+    most_open: u32,
     corner: (i64, i64),
     size: (usize, usize),
 ) -> Vec<Option<Fill>> {
-    match 2 * kernel.radius() + 1 {
-        0..=64 => sweep_by::<1>(planes, kernel, corner, size),
-        65..=128 => sweep_by::<2>(planes, kernel, corner, size),
-        129..=256 => sweep_by::<4>(planes, kernel, corner, size),
-        _ => sweep_by::<8>(planes, kernel, corner, size),
+    match 2 * disc.1.radius() + 1 {
+        0..=64 => sweep_by::<1>(disc, most_open, corner, size),
+        65..=128 => sweep_by::<2>(disc, most_open, corner, size),
+        129..=256 => sweep_by::<4>(disc, most_open, corner, size),
+        _ => sweep_by::<8>(disc, most_open, corner, size),
     }
 }
 
 fn sweep_by<const W: usize>(
-    planes: &BitPlanes,
-    kernel: &KernelRows,
+    (planes, kernel): (&BitPlanes, &KernelRows),
+    most_open: u32,
     (column, row): (i64, i64),
     (width, height): (usize, usize),
 ) -> Vec<Option<Fill>> {
-    let mut disc = DiscSweep::<W>::new(planes, kernel);
+    let mut disc = DiscSweep::<W>::new(planes, kernel, most_open);
     let mut fills = vec![None; width * height];
     for (up, fills) in (0..).zip(fills.chunks_exact_mut(width)) {
         disc.sweep(column, row + up, fills);
@@ -325,14 +327,15 @@ fn sweep_by<const W: usize>(
 }
 
 impl DensityFieldConfig {
-    /// The density of a fill when it is hard, else NaN.
-    fn hard_density(&self, fill: &Option<Fill>, bandwidth_cells: f64) -> f32 {
-        let most_open = self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells;
-        match fill {
-            Some(fill) if f64::from(fill.num_open) <= most_open => fill.density.min(1.0),
-            _ => f32::NAN,
-        }
+    /// Open cells that may hang together while the density of a kernel is still hard.
+    fn most_open(&self, bandwidth_cells: f64) -> u32 {
+        (self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells) as u32
     }
+}
+
+/// The density of a fill when it is hard, else NaN.
+fn hard_density(fill: &Option<Fill>) -> f32 {
+    fill.filter(|fill| !fill.has_opening).map_or(f32::NAN, |fill| fill.density.min(1.0))
 }
 
 /// What the robot itself sees at its pose: the readings of its local map there, directions relative to its heading.
@@ -379,6 +382,7 @@ fn densities_around(
     let kernel = KernelRows::new(config.profile, bandwidth_cells);
     let planes = BitPlanes::new(map, margin(&kernel));
     let half = AROUND as i64 / 2;
-    let fills = sweep(&planes, &kernel, (cell.0 - half, cell.1 - half), (AROUND, AROUND));
-    fills.iter().map(|fill| config.hard_density(fill, bandwidth_cells)).collect()
+    let most_open = config.most_open(bandwidth_cells);
+    let fills = sweep((&planes, &kernel), most_open, (cell.0 - half, cell.1 - half), (AROUND, AROUND));
+    fills.iter().map(hard_density).collect()
 }

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::geometry::Point2;
 use crate::grid::{Cell, LocalMap};
+use crate::mapping::TiledOccupancy;
 
 /// What is known of a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -48,6 +49,24 @@ impl GridMap {
     pub fn unknown(width: usize, height: usize, resolution_m: f64, origin: Point2) -> Self {
         let (width, height) = (width.max(1), height.max(1));
         Self { width, height, resolution_m, origin, cells: vec![CellState::Unknown; width * height] }
+    }
+
+    /// The rectangle of the cells that scans have seen; None when they saw none.
+    pub fn of_occupancy(occupancy: &TiledOccupancy) -> Option<Self> {
+        let bounds = occupancy.bounds()?;
+        let width = bounds.width();
+        let mut cells = vec![CellState::Unknown; width * bounds.height()];
+        for ((column, row), counts) in occupancy.seen_cells() {
+            let (column, row) = ((column - bounds.low.0) as usize, (row - bounds.low.1) as usize);
+            cells[row * width + column] = match occupancy.is_occupied(counts) {
+                None => CellState::Unknown,
+                Some(false) => CellState::Free,
+                Some(true) => CellState::Occupied,
+            };
+        }
+        let corner = |index: i32| f64::from(index) * occupancy.resolution_m();
+        let origin = Point2::new(corner(bounds.low.0), corner(bounds.low.1));
+        Self::new(width, occupancy.resolution_m(), origin, cells)
     }
 
     /// What a robot's local map knows within `radius_m` of the robot, in the frame of that map; None before the first
@@ -158,6 +177,9 @@ impl GridMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::Pose2;
+    use crate::mapping::OccupancyConfig;
+    use crate::scan::ScanGeometry;
 
     #[test]
     fn cells_and_points_agree() {
@@ -181,5 +203,30 @@ mod tests {
         assert!(GridMap::new(3, 0.1, Point2::default(), vec![CellState::Free; 7]).is_none());
         assert!(GridMap::new(3, 0.0, Point2::default(), vec![CellState::Free; 6]).is_none());
         assert!(GridMap::new(3, 0.1, Point2::default(), vec![CellState::Free; 6]).is_some());
+    }
+
+    #[test]
+    fn a_drawn_grid_is_the_rectangle_of_seen_cells() {
+        use CellState::{Free, Occupied, Unknown};
+        let config = OccupancyConfig { resolution_m: 1.0, ..OccupancyConfig::default() };
+        let mut occupancy = TiledOccupancy::new(config).unwrap();
+        let geometry = ScanGeometry {
+            num_ranges: 4,
+            angle_min_rad: 0.0,
+            angle_increment_rad: std::f64::consts::FRAC_PI_2,
+            range_max_m: 50.0,
+            robot_from_laser: Pose2::identity(),
+        };
+        occupancy.add_scan(&geometry, &[3.0, 2.0, 1.0, 1.0], &Pose2::new(0.5, 0.5, 0.0));
+        let map = GridMap::of_occupancy(&occupancy).unwrap();
+        assert_eq!((map.width(), map.height(), map.origin()), (5, 4, Point2::new(-1.0, -1.0)));
+        #[rustfmt::skip]
+        let from_below = [
+            Unknown,  Occupied, Unknown, Unknown,  Unknown,
+            Occupied, Free,     Free,    Free,     Occupied,
+            Unknown,  Free,     Unknown, Unknown,  Unknown,
+            Unknown,  Occupied, Unknown, Unknown,  Unknown,
+        ];
+        assert_eq!(map.cells(), from_below);
     }
 }

@@ -30,6 +30,7 @@ mod likelihood_field;
 mod localizer;
 mod motion_model;
 mod noise;
+mod openings;
 mod particle_filter;
 mod particles;
 mod raycast;

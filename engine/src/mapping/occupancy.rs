@@ -1,10 +1,10 @@
 //! The occupancy grid of a map, rendered from stored scans at optimised poses.
 //!
 //! Every cell counts the scans that saw a return in it and those that saw through it (Moravec and Elfes' counting
-//! model). The counts live in tiles that exist only where a beam has been, and rows are read out one at a time, so
-//! that neither rendering nor serving a large map needs its bounding box in memory.
+//! model). The counts live in tiles that exist only where a beam has been, so that memory follows what was seen and not
+//! the rectangle around it.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
@@ -47,8 +47,8 @@ impl OccupancyConfig {
     /// The first field that cannot work.
     pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
         let lengths = [
-            ("resolution_m", self.resolution_m, 0.01, 1.0),
-            ("range_limit_m", self.range_limit_m, self.resolution_m, 200.0),
+            ("resolution_m", self.resolution_m, 0.01, 1000.0),
+            ("range_limit_m", self.range_limit_m, 0.01, 200.0),
             ("no_return_clear_m", self.no_return_clear_m, 0.0, 200.0),
             ("occupied_share_min", self.occupied_share_min, f64::MIN_POSITIVE, 1.0),
         ];
@@ -81,15 +81,20 @@ const TILE_SIZE: i32 = 64;
 /// Farthest cell from the origin, so that no index overflows; beyond it nothing is drawn.
 const CELL_LIMIT: f64 = 1e6;
 
-/// Value of nav_msgs for a cell nobody saw.
-const UNKNOWN: i8 = -1;
-
 /// Hit and miss counts in tiles.
 #[derive(Clone, Debug)]
 pub struct TiledOccupancy {
     config: OccupancyConfig,
     tile_of: BTreeMap<CellIndex, usize>,
-    tiles: Vec<Vec<CellCounts>>,
+    tiles: Vec<Vec<CountedCell>>,
+    num_scans: u32,
+}
+
+/// Counts of a cell and the last scan that judged it, so that a scan judges it once.
+#[derive(Clone, Copy, Debug, Default)]
+struct CountedCell {
+    counts: CellCounts,
+    last_scan: u32,
 }
 
 /// Smallest rectangle of cells around all tiles' seen cells; both corners inclusive.
@@ -120,7 +125,7 @@ impl TiledOccupancy {
     /// The first field of the configuration that cannot work.
     pub fn new(config: OccupancyConfig) -> Result<Self, ConfigError> {
         config.validate("occupancy")?;
-        Ok(Self { config, tile_of: BTreeMap::new(), tiles: Vec::new() })
+        Ok(Self { config, tile_of: BTreeMap::new(), tiles: Vec::new(), num_scans: 0 })
     }
 
     /// Edge of a cell, metres.
@@ -136,33 +141,39 @@ impl TiledOccupancy {
         if !is_drawable(start) {
             return;
         }
-        let mut hits = HashSet::new();
+        self.num_scans += 1;
+        let mut cursor = TileCursor::default();
         let mut rays = Vec::with_capacity(ranges_m.len());
         for (beam_idx, &range_m) in ranges_m.iter().enumerate() {
             let Some((length_m, is_hit)) = self.reach(geometry, range_m) else { continue };
-            let direction = map_from_laser.theta + geometry.beam_angle_rad(beam_idx);
-            let end = (
-                start.0 + direction.cos() * length_m / self.config.resolution_m,
-                start.1 + direction.sin() * length_m / self.config.resolution_m,
-            );
+            let (sin, cos) = (map_from_laser.theta + geometry.beam_angle_rad(beam_idx)).sin_cos();
+            let length = length_m / self.config.resolution_m;
+            let end = (start.0 + cos * length, start.1 + sin * length);
             if is_hit {
-                hits.insert(cell_of(end));
+                self.judge(cell_of(end), &mut cursor, |counts| &mut counts.num_hits);
             }
             rays.push(end);
         }
-        let mut cursor = TileCursor::default();
-        let mut misses = HashSet::new();
         for end in rays {
             for cell in cells_before_end(start, end) {
-                if !hits.contains(&cell) && misses.insert(cell) {
-                    let counts = self.counts_mut(cell, &mut cursor);
-                    counts.num_misses = counts.num_misses.saturating_add(1);
-                }
+                self.judge(cell, &mut cursor, |counts| &mut counts.num_misses);
             }
         }
-        for cell in hits {
-            let counts = self.counts_mut(cell, &mut cursor);
-            counts.num_hits = counts.num_hits.saturating_add(1);
+    }
+
+    /// Counts what the scan at hand says of a cell, unless it has said something already.
+    fn judge(
+        &mut self,
+        cell: CellIndex,
+        cursor: &mut TileCursor,
+        count_of: impl Fn(&mut CellCounts) -> &mut u16,
+    ) {
+        let scan = self.num_scans;
+        let counted = self.cell_mut(cell, cursor);
+        if counted.last_scan != scan {
+            counted.last_scan = scan;
+            let count = count_of(&mut counted.counts);
+            *count = count.saturating_add(1);
         }
     }
 
@@ -186,12 +197,12 @@ impl TiledOccupancy {
         (point.x / self.config.resolution_m, point.y / self.config.resolution_m)
     }
 
-    fn counts_mut(&mut self, cell: CellIndex, cursor: &mut TileCursor) -> &mut CellCounts {
+    fn cell_mut(&mut self, cell: CellIndex, cursor: &mut TileCursor) -> &mut CountedCell {
         let key = tile_key(cell);
         if cursor.key != Some(key) {
             let tiles = &mut self.tiles;
             let tile = *self.tile_of.entry(key).or_insert_with(|| {
-                tiles.push(vec![CellCounts::default(); (TILE_SIZE * TILE_SIZE) as usize]);
+                tiles.push(vec![CountedCell::default(); (TILE_SIZE * TILE_SIZE) as usize]);
                 tiles.len() - 1
             });
             *cursor = TileCursor { key: Some(key), tile };
@@ -203,19 +214,18 @@ impl TiledOccupancy {
     pub fn counts(&self, cell: CellIndex) -> CellCounts {
         self.tile_of
             .get(&tile_key(cell))
-            .map(|&tile| self.tiles[tile][offset_in_tile(cell)])
+            .map(|&tile| self.tiles[tile][offset_in_tile(cell)].counts)
             .unwrap_or_default()
     }
 
     /// All cells that were seen, tile by tile in a fixed order.
     pub fn seen_cells(&self) -> impl Iterator<Item = (CellIndex, CellCounts)> + '_ {
         self.tile_of.iter().flat_map(move |(&(tile_x, tile_y), &tile)| {
-            self.tiles[tile].iter().enumerate().filter(|(_, counts)| **counts != CellCounts::default()).map(
-                move |(offset, counts)| {
-                    let (row, column) = (offset as i32 / TILE_SIZE, offset as i32 % TILE_SIZE);
-                    ((tile_x * TILE_SIZE + column, tile_y * TILE_SIZE + row), *counts)
-                },
-            )
+            let seen = self.tiles[tile].iter().enumerate().filter(|(_, cell)| cell.last_scan != 0);
+            seen.map(move |(offset, cell)| {
+                let (row, column) = (offset as i32 / TILE_SIZE, offset as i32 % TILE_SIZE);
+                ((tile_x * TILE_SIZE + column, tile_y * TILE_SIZE + row), cell.counts)
+            })
         })
     }
 
@@ -238,49 +248,11 @@ impl TiledOccupancy {
         Point2::new(middle(cell.0), middle(cell.1))
     }
 
-    /// nav_msgs/OccupancyGrid's value of a cell: −1 unknown, else the percentage of scans that saw a return, raised
-    /// to 100 where the cell counts as occupied.
-    pub fn value(&self, cell: CellIndex) -> i8 {
-        let CellCounts { num_hits, num_misses } = self.counts(cell);
+    /// Whether a cell with these counts is occupied; `None` while too few scans have judged it.
+    pub fn is_occupied(&self, CellCounts { num_hits, num_misses }: CellCounts) -> Option<bool> {
         let num_scans = u32::from(num_hits) + u32::from(num_misses);
-        if num_scans == 0 || num_scans < u32::from(self.config.num_scans_min) {
-            return UNKNOWN;
-        }
-        let share = f64::from(num_hits) / f64::from(num_scans);
-        if share >= self.config.occupied_share_min { 100 } else { (share * 100.0).min(99.0) as i8 }
-    }
-
-    /// One row of nav_msgs values from left to right.
-    pub fn row_values(&self, bounds: &CellBounds, row: i32) -> impl Iterator<Item = i8> + '_ {
-        (bounds.low.0..=bounds.high.0).map(move |column| self.value((column, row)))
-    }
-
-    /// A binary PGM as map_server reads it: 254 free, 0 occupied, 205 unknown, the first row on top. `write` gets
-    /// the head and then one row at a time; the first error ends the picture.
-    ///
-    /// # Errors
-    /// Whatever `write` says.
-    pub fn write_pgm<E>(
-        &self,
-        bounds: &CellBounds,
-        mut write: impl FnMut(&[u8]) -> Result<(), E>,
-    ) -> Result<(), E> {
-        write(format!("P5\n{} {}\n255\n", bounds.width(), bounds.height()).as_bytes())?;
-        for row in (bounds.low.1..=bounds.high.1).rev() {
-            let pixels: Vec<u8> = self.row_values(bounds, row).map(pixel_of).collect();
-            write(&pixels)?;
-        }
-        Ok(())
-    }
-
-    /// The YAML file that goes with the picture `image`.
-    pub fn yaml(&self, bounds: &CellBounds, image: &str) -> String {
-        let resolution = self.config.resolution_m;
-        let (x, y) = (f64::from(bounds.low.0) * resolution, f64::from(bounds.low.1) * resolution);
-        format!(
-            "image: {image}\nmode: trinary\nresolution: {resolution}\norigin: [{x}, {y}, 0.0]\nnegate: 0\n\
-             occupied_thresh: 0.65\nfree_thresh: 0.196\n"
-        )
+        (num_scans >= u32::from(self.config.num_scans_min.max(1)))
+            .then(|| f64::from(num_hits) >= self.config.occupied_share_min * f64::from(num_scans))
     }
 }
 
@@ -289,14 +261,6 @@ impl TiledOccupancy {
 struct TileCursor {
     key: Option<CellIndex>,
     tile: usize,
-}
-
-fn pixel_of(value: i8) -> u8 {
-    match value {
-        UNKNOWN => 205,
-        100 => 0,
-        _ => 254,
-    }
 }
 
 fn tile_key(cell: CellIndex) -> CellIndex {
@@ -371,12 +335,13 @@ mod tests {
     #[test]
     fn beams_clear_up_to_their_return() {
         let grid = drawn([3.0, f32::NAN, f32::INFINITY, 20.0]);
-        let row: Vec<i8> = (0..=4).map(|column| grid.value((column, 0))).collect();
-        assert_eq!(row, [0, 0, 0, 100, -1]);
-        assert_eq!(grid.value((0, 1)), -1, "NaN clears nothing");
-        assert_eq!(grid.value((-2, 0)), 0, "no return clears a little");
-        assert_eq!(grid.value((-3, 0)), -1);
-        assert_eq!(grid.value((0, -14)), 0, "a far return clears up to the limit");
+        let is_occupied = |column, row| grid.is_occupied(grid.counts((column, row)));
+        let row: Vec<Option<bool>> = (0..=4).map(|column| is_occupied(column, 0)).collect();
+        assert_eq!(row, [Some(false), Some(false), Some(false), Some(true), None]);
+        assert_eq!(is_occupied(0, 1), None, "NaN clears nothing");
+        assert_eq!(is_occupied(-2, 0), Some(false), "no return clears a little");
+        assert_eq!(is_occupied(-3, 0), None);
+        assert_eq!(is_occupied(0, -14), Some(false), "a far return clears up to the limit");
         assert_eq!(grid.counts((0, -15)), CellCounts::default());
     }
 
@@ -391,32 +356,13 @@ mod tests {
     }
 
     #[test]
-    fn exports_agree_with_one_another() {
-        let grid = drawn([3.0, 2.0, 1.0, 1.0]);
-        let bounds = grid.bounds().unwrap();
-        assert_eq!((bounds.width(), bounds.height()), (5, 4));
-        let mut picture = Vec::new();
-        grid.write_pgm(&bounds, |bytes| {
-            picture.extend_from_slice(bytes);
-            Ok::<(), ()>(())
-        })
-        .unwrap();
-        let pixels = picture.strip_prefix(b"P5\n5 4\n255\n").unwrap();
-        assert_eq!(
-            pixels,
-            [205, 0, 205, 205, 205, 205, 254, 205, 205, 205, 0, 254, 254, 254, 0, 205, 0, 205, 205, 205]
-        );
-        assert!(grid.yaml(&bounds, "map.pgm").contains("origin: [-1, -1, 0.0]"));
-    }
-
-    #[test]
     fn tiles_join_seamlessly_across_negative_indices() {
         let mut grid =
             TiledOccupancy::new(OccupancyConfig { resolution_m: 0.1, ..OccupancyConfig::default() }).unwrap();
         grid.add_scan(&cross(), &[14.0, 14.0, 14.0, 14.0], &Pose2::new(0.05, 0.05, 0.0));
         let bounds = grid.bounds().unwrap();
         assert_eq!((bounds.low, bounds.high), ((-140, -140), (140, 140)));
-        assert!(grid.row_values(&bounds, 0).skip(1).take(279).all(|value| value == 0));
+        assert!((-139..=139).all(|column| grid.is_occupied(grid.counts((column, 0))) == Some(false)));
     }
 
     #[test]

@@ -8,8 +8,9 @@ use crate::config::ConfigError;
 
 /// How places are labelled from the map.
 ///
-/// The lengths of forks and bends and the two angles of corners were chosen on `aces`, `intel` and `mit-killian`; what
-/// they are worth on a building that had no say in them was measured by leaving one out: corner precision on `intel` falls to about 15 %.
+/// The lengths of forks and bends, the two limits of corners and the smoothing were chosen on `aces`, `intel`,
+/// `mit-killian` and three simulated floors, where a range of values does about equally well. What they are worth on a
+/// building that had no say in them was measured by leaving one out at a time: docs/evaluation.md has the figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SemanticsConfig {
@@ -84,19 +85,19 @@ impl Default for SemanticsConfig {
             fork_near_m: 1.5,
             fork_near_per_half_width: 2.0,
             fork_near_max_m: 5.5,
-            fork_length_m: 4.5,
-            bend_half_width_m: 0.7,
-            bend_near_m: 4.0,
+            fork_length_m: 3.5,
+            bend_half_width_m: 0.6,
+            bend_near_m: 3.0,
             bend_length_m: 1.5,
-            corner_straightness: 0.84,
-            corner_turn_rad: 25.0 / 180.0 * PI,
+            corner_straightness: 0.87,
+            corner_turn_rad: 20.0 / 180.0 * PI,
             turn_reach_m: 2.0,
             dead_end_straightness: 0.8,
             driven_near_m: 1.5,
             driven_length_m: 5.0,
             hall_radius_m: 3.0,
             hall_core_share: 0.8,
-            smoothing_m: 0.8,
+            smoothing_m: 1.6,
             place_cell_m: 0.5,
             place_cells_min: 3,
         }

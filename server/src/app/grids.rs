@@ -3,14 +3,18 @@
 use std::sync::{Arc, PoisonError};
 
 use locution_engine::localization::GridMap;
+use locution_engine::mapping::{OccupancyConfig, TiledOccupancy};
 
 use super::maps::{MapRecord, PlacedRun};
-use super::occupancy::OccupancyCounter;
 use super::site::Site;
 use super::{App, AppError, on_blocking_thread};
 
 /// Edge of a served cell, metres.
 const RESOLUTION_M: f64 = 0.05;
+/// Beams are followed no farther than this, metres: beyond, their ends are too far apart to draw walls.
+const RANGE_LIMIT_M: f64 = 20.0;
+/// Grids are drawn coarser rather than with more cells than this.
+const NUM_CELLS_MAX: f64 = 6.4e7;
 /// Keyframes read and drawn at once.
 const NUM_KEYFRAMES_PER_STEP: usize = 500;
 
@@ -41,8 +45,8 @@ impl App {
 }
 
 async fn draw(site: &Site, runs: &[PlacedRun]) -> Result<Option<GridMap>, AppError> {
-    let (width_m, height_m) = extent(runs);
-    let mut counter = OccupancyCounter::new(RESOLUTION_M, width_m, height_m);
+    let mut grid = TiledOccupancy::new(occupancy_config(extent(runs)))
+        .map_err(|_| AppError::NotReady { detail: "the map is too wide to be drawn".to_owned() })?;
     for placed in runs {
         let geometry = placed.run.geometry.clone();
         for first in (0..placed.poses.len()).step_by(NUM_KEYFRAMES_PER_STEP) {
@@ -50,16 +54,27 @@ async fn draw(site: &Site, runs: &[PlacedRun]) -> Result<Option<GridMap>, AppErr
             let scans = site.keyframe_scans(placed, range.clone()).await?;
             let poses = placed.poses[range].to_vec();
             let geometry = geometry.clone();
-            counter = on_blocking_thread(move || {
+            grid = on_blocking_thread(move || {
                 for (pose, scan) in poses.iter().zip(&scans) {
-                    counter.add(&geometry, &pose.map_from_robot, &scan.ranges_m);
+                    grid.add_scan(&geometry, &scan.ranges_m, &pose.map_from_robot);
                 }
-                counter
+                grid
             })
             .await?;
         }
     }
-    on_blocking_thread(move || counter.finish()).await
+    on_blocking_thread(move || GridMap::of_occupancy(&grid)).await
+}
+
+/// What the grid of an area of this width and height is drawn with.
+fn occupancy_config((width_m, height_m): (f64, f64)) -> OccupancyConfig {
+    let area_m2 = (width_m + 2.0 * RANGE_LIMIT_M) * (height_m + 2.0 * RANGE_LIMIT_M);
+    OccupancyConfig {
+        resolution_m: RESOLUTION_M.max((area_m2 / NUM_CELLS_MAX).sqrt()),
+        range_limit_m: RANGE_LIMIT_M,
+        no_return_clear_m: 0.0,
+        ..OccupancyConfig::default()
+    }
 }
 
 /// Width and height of the rectangle around all poses, metres.

@@ -30,7 +30,6 @@ pub mod localisations;
 pub mod maps;
 pub mod matches;
 mod names;
-mod occupancy;
 mod open_runs;
 mod places;
 pub mod reading;
