@@ -5,7 +5,7 @@ mod floor_plan;
 mod icp_baseline;
 mod localization;
 mod published;
-mod scenarios;
+pub(in crate::cli) mod scenarios;
 mod text_sweep;
 
 use std::path::{Path, PathBuf};
