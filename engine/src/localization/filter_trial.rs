@@ -4,7 +4,7 @@
 
 use super::{
     BeamComparison, BeamModel, BeamModelConfig, DensityFieldConfig, DensityModel, DensityModelConfig,
-    GridMap, ParticleFilter, ParticleFilterConfig, RecoveryConfig, ServedMap, observe,
+    GridMap, KernelReading, ParticleFilter, ParticleFilterConfig, RecoveryConfig, ServedMap, observe,
 };
 use crate::geometry::Pose2;
 use crate::grid::{LocalMap, LocalMapConfig};
@@ -19,6 +19,49 @@ pub enum FilterSensor {
     Beams(BeamComparison),
 }
 
+/// What the robot knows after a step, whatever the filter that uses it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sensed {
+    /// Odometry since the last step.
+    pub previous_from_robot: Pose2,
+    /// Its own densities, one per kernel; none for beams.
+    pub readings: Vec<KernelReading>,
+}
+
+/// The robot's side of a localisation: odometry, local map and densities, the same for every seed.
+#[derive(Clone, Debug)]
+pub struct FilterSenses {
+    fields: Option<DensityFieldConfig>,
+    local_map: LocalMap,
+    last_odom_from_robot: Option<Pose2>,
+}
+
+impl FilterSenses {
+    /// A robot that has seen nothing yet.
+    pub fn new(sensor: &FilterSensor, geometry: &ScanGeometry) -> Self {
+        let fields = match sensor {
+            FilterSensor::Densities(fields) => Some(fields.clone()),
+            FilterSensor::Beams(_) => None,
+        };
+        let local_map = LocalMap::new(&LocalMapConfig::default(), geometry);
+        Self { fields, local_map, last_odom_from_robot: None }
+    }
+
+    /// Takes a scan in: into the local map and the densities there, where densities are asked for.
+    pub fn sense(&mut self, scan: &Scan) -> Sensed {
+        let last = self.last_odom_from_robot.replace(scan.odom_from_robot);
+        let previous_from_robot = last.map_or(Pose2::identity(), |last| last.between(&scan.odom_from_robot));
+        let readings = self.fields.as_ref().map_or_else(Vec::new, |fields| {
+            self.local_map.integrate_scan(&scan.ranges_m, &scan.odom_from_robot);
+            let widest_m = fields.bandwidths_m.iter().copied().fold(0.0, f64::max);
+            GridMap::around_robot(&self.local_map, widest_m + 0.5)
+                .map(|around| observe(&around, &scan.odom_from_robot, fields))
+                .unwrap_or_default()
+        });
+        Sensed { previous_from_robot, readings }
+    }
+}
+
 /// A global localisation under way.
 #[derive(Clone, Debug)]
 pub struct FilterTrial<'a> {
@@ -26,9 +69,7 @@ pub struct FilterTrial<'a> {
     geometry: ScanGeometry,
     sensor: FilterSensor,
     filter: ParticleFilter,
-    local_map: LocalMap,
     beams: BeamModelConfig,
-    last_odom_from_robot: Option<Pose2>,
 }
 
 impl<'a> FilterTrial<'a> {
@@ -45,35 +86,23 @@ impl<'a> FilterTrial<'a> {
             recovery: RecoveryConfig { fast: 0.0, ..Default::default() },
             ..Default::default()
         };
-        Self {
-            map,
-            geometry: geometry.clone(),
-            sensor,
-            filter: ParticleFilter::global(map, config, seed),
-            local_map: LocalMap::new(&LocalMapConfig::default(), geometry),
-            beams: BeamModelConfig::default(),
-            last_odom_from_robot: None,
-        }
+        let filter = ParticleFilter::global(map, config, seed);
+        Self { map, geometry: geometry.clone(), sensor, filter, beams: BeamModelConfig::default() }
     }
 
-    /// One iteration of the filter: local map, density where it is needed, prediction, weights, resampling.
-    pub fn step(&mut self, scan: &Scan) {
-        let last = self.last_odom_from_robot.replace(scan.odom_from_robot);
-        let motion = last.map_or(Pose2::identity(), |last| last.between(&scan.odom_from_robot));
+    /// One iteration of the filter: prediction, weights, resampling.
+    pub fn step(&mut self, scan: &Scan, sensed: &Sensed) {
+        let motion = &sensed.previous_from_robot;
         match &self.sensor {
-            FilterSensor::Densities(fields) => {
-                self.local_map.integrate_scan(&scan.ranges_m, &scan.odom_from_robot);
-                let widest_m = fields.bandwidths_m.iter().copied().fold(0.0, f64::max);
-                let seen = GridMap::around_robot(&self.local_map, widest_m + 0.5)
-                    .map(|around| observe(&around, &scan.odom_from_robot, fields))
-                    .unwrap_or_default();
-                let model = DensityModel::new(&self.map.density, &seen, &DensityModelConfig::default());
-                self.filter.update(self.map, &motion, &model);
+            FilterSensor::Densities(_) => {
+                let config = DensityModelConfig::default();
+                let model = DensityModel::new(&self.map.density, &sensed.readings, &config);
+                self.filter.update(self.map, motion, &model);
             }
             FilterSensor::Beams(comparison) => {
                 let model =
                     BeamModel::new(&self.map.grid, &self.geometry, &scan.ranges_m, *comparison, &self.beams);
-                self.filter.update(self.map, &motion, &model);
+                self.filter.update(self.map, motion, &model);
             }
         }
     }
@@ -122,9 +151,10 @@ mod tests {
         ];
         for (sensor, num_particles) in sensors {
             let errors_of = || {
+                let mut senses = FilterSenses::new(&sensor, &run.geometry);
                 let mut trial = FilterTrial::new(&map, &run.geometry, sensor.clone(), num_particles, 5);
                 let step = |(scan, truth): (&Scan, &crate::formats::TruthPose)| {
-                    trial.step(scan);
+                    trial.step(scan, &senses.sense(scan));
                     trial.mean_error_m(&truth.truth_from_robot)
                 };
                 run.scans.iter().zip(&run.truth).map(step).collect::<Vec<f64>>()

@@ -52,7 +52,7 @@ pub use config::LocalizationConfig;
 pub use density_field::{DensityField, DensityFieldConfig, KernelReading, MAX_KERNELS, observe};
 pub use density_gradient::GradientConfig;
 pub use density_model::{DensityModel, DensityModelConfig};
-pub use filter_trial::{FilterSensor, FilterTrial};
+pub use filter_trial::{FilterSenses, FilterSensor, FilterTrial, Sensed};
 pub use global_search::{GlobalSearchConfig, ScoredPose, SearchPyramid};
 pub use grid_map::{CellState, GridMap};
 pub use hypotheses::{ClusterConfig, Hypothesis};

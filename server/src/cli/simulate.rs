@@ -10,16 +10,21 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use locution_engine::formats::{carmen_header, carmen_scan_lines, truth_text};
 use locution_engine::geometry::Point2;
-use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, simulate_run};
+use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 
+use super::eval::thesis::scenarios::Plan;
+use super::output::write_json;
 use super::worlds::read_world;
 
 /// The same arguments give the same bytes.
 #[derive(Debug, Args)]
 pub struct SimulateArguments {
     /// YAML file of a ROS map_server world.
-    #[arg(long)]
-    world: PathBuf,
+    #[arg(long, required_unless_present = "plan")]
+    world: Option<PathBuf>,
+    /// Instead of a world: a floor of corridors whose places are known; they are written to NAME.labels.json.
+    #[arg(long, value_enum, conflicts_with_all = ["world", "second_world"])]
+    plan: Option<Plan>,
     /// The same building with other doors or furniture, in the same frame; the task is driven there once more, as a
     /// second recording NAME-second.
     #[arg(long)]
@@ -102,21 +107,30 @@ impl SimulateArguments {
 /// # Errors
 /// Files that cannot be read or written; a task that cannot be driven.
 pub fn run(arguments: &SimulateArguments) -> Result<()> {
-    let (task, config) = (arguments.task()?, arguments.config());
     let name = arguments.out.to_string_lossy().into_owned();
+    if let Some(plan) = arguments.plan {
+        let (world, places) = plan.draw()?;
+        drive(arguments, &world, &name, arguments.seed)?;
+        return write_json(Path::new(&format!("{name}.labels.json")), &places);
+    }
     let second =
         arguments.second_world.iter().map(|world| (world, format!("{name}-second"), arguments.seed + 1));
-    for (world_path, name, seed) in
-        std::iter::once((&arguments.world, name.clone(), arguments.seed)).chain(second)
-    {
-        let simulated = simulate_run(&read_world(world_path)?, &task, &config, seed)
+    let first = arguments.world.iter().map(|world| (world, name.clone(), arguments.seed));
+    for (world_path, name, seed) in first.chain(second) {
+        drive(arguments, &read_world(world_path)?, &name, seed)
             .with_context(|| world_path.display().to_string())?;
-        let written = write_recording(&simulated, &name, arguments.gzip)?;
-        let poses = &simulated.truth;
-        let driven_m: f64 =
-            poses.windows(2).map(|pair| pair[0].truth_from_robot.distance(&pair[1].truth_from_robot)).sum();
-        println!("{}: {} scans over {driven_m:.1} m", written.join(", "), simulated.scans.len());
     }
+    Ok(())
+}
+
+/// Simulates one recording and writes it.
+fn drive(arguments: &SimulateArguments, world: &World, name: &str, seed: u64) -> Result<()> {
+    let simulated = simulate_run(world, &arguments.task()?, &arguments.config(), seed)?;
+    let written = write_recording(&simulated, name, arguments.gzip)?;
+    let poses = &simulated.truth;
+    let driven_m: f64 =
+        poses.windows(2).map(|pair| pair[0].truth_from_robot.distance(&pair[1].truth_from_robot)).sum();
+    println!("{}: {} scans over {driven_m:.1} m", written.join(", "), simulated.scans.len());
     Ok(())
 }
 

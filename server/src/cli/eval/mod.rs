@@ -10,7 +10,7 @@ mod map;
 mod plot;
 pub mod recognition;
 mod stroke_font;
-mod thesis;
+pub(in crate::cli) mod thesis;
 
 /// Prints tables and writes JSON.
 #[derive(Debug, Args)]

@@ -1,6 +1,9 @@
 //! Corridors named by letters, as Table 4.1 names them, and routes spelled with the letters.
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use anyhow::{Context, Result};
+use locution_engine::formats::{LabelledPlaces, LabelledRegion};
 use locution_engine::geometry::Point2;
 
 /// A corridor: its letter, the places it runs through and its width.
@@ -59,6 +62,71 @@ impl CorridorGraph {
     }
 }
 
+/// Where corridors meet or bend.
+#[derive(Clone, Debug, Default)]
+struct Meeting {
+    /// Directions in which a corridor leaves, as signs along the axes.
+    ways: BTreeSet<(i8, i8)>,
+    /// Width of the widest of them.
+    width_m: f64,
+}
+
+impl Meeting {
+    /// What kind of place it is; none when a corridor runs straight through or ends.
+    fn label(&self) -> Option<&'static str> {
+        let ways: Vec<(i8, i8)> = self.ways.iter().copied().collect();
+        match ways.as_slice() {
+            [] | [_] => None,
+            [a, b] => ((a.0 + b.0, a.1 + b.1) != (0, 0)).then_some("corner"),
+            _ => Some("bifurcation"),
+        }
+    }
+}
+
+impl CorridorGraph {
+    /// What kind of place each spot is: bifurcations and corners reach half a corridor's width beyond the crossing into
+    /// each arm, as those that people drew on the recordings do; everything else is corridor.
+    pub(super) fn labelled_places(&self) -> LabelledPlaces {
+        let mut meetings: BTreeMap<(i64, i64), Meeting> = BTreeMap::new();
+        let tenths = |metres: f64| (metres * 10.0).round() as i64;
+        for corridor in &self.corridors {
+            for leg in corridor.points.windows(2) {
+                for (from, to) in [(leg[0], leg[1]), (leg[1], leg[0])] {
+                    let sign = |by: i64| by.signum() as i8;
+                    let way = (sign(tenths(to.x) - tenths(from.x)), sign(tenths(to.y) - tenths(from.y)));
+                    let meeting = meetings.entry((tenths(from.x), tenths(from.y))).or_default();
+                    meeting.ways.insert(way);
+                    meeting.width_m = meeting.width_m.max(corridor.width_m);
+                }
+            }
+        }
+        let mut regions: Vec<LabelledRegion> = meetings
+            .iter()
+            .filter_map(|(&(x, y), meeting)| {
+                let (x, y, reach) = (x as f64 / 10.0, y as f64 / 10.0, meeting.width_m);
+                Some(region(meeting.label()?, (x - reach, y - reach), (x + reach, y + reach)))
+            })
+            .collect();
+        // Crossings before corners where both claim a spot.
+        regions.sort_by(|a, b| a.label.cmp(&b.label));
+        regions.extend(self.corridors.iter().flat_map(|corridor| {
+            let half = corridor.width_m / 2.0;
+            corridor.points.windows(2).map(move |leg| {
+                let low = (leg[0].x.min(leg[1].x) - half, leg[0].y.min(leg[1].y) - half);
+                let high = (leg[0].x.max(leg[1].x) + half, leg[0].y.max(leg[1].y) + half);
+                region("corridor", low, high)
+            })
+        }));
+        LabelledPlaces { frame: "world".into(), notes: "Labelled by the simulator.".into(), regions }
+    }
+}
+
+/// A rectangle between two opposite corners.
+fn region(label: &str, low: (f64, f64), high: (f64, f64)) -> LabelledRegion {
+    let polygon = vec![[low.0, low.1], [high.0, low.1], [high.0, high.1], [low.0, high.1]];
+    LabelledRegion { label: label.into(), polygon }
+}
+
 /// The corners of a corridor, or the middle of a straight one.
 fn with_middle(points: &[Point2]) -> Vec<Point2> {
     match points {
@@ -94,5 +162,29 @@ mod tests {
         let expected = [(5.0, 0.0), (10.0, 5.0), (0.0, 5.0), (5.0, 0.0)].map(|(x, y)| Point2::new(x, y));
         assert_eq!(waypoints, expected);
         assert!(graph.waypoints("AX").is_err());
+    }
+
+    #[test]
+    fn places_are_what_meets_in_them() {
+        let corridor = |letter, points: &[(f64, f64)]| Corridor {
+            letter,
+            points: points.iter().map(|&(x, y)| Point2::new(x, y)).collect(),
+            width_m: 2.0,
+        };
+        let graph = CorridorGraph {
+            corridors: vec![
+                corridor('A', &[(0.0, 0.0), (10.0, 0.0), (20.0, 0.0)]),
+                corridor('B', &[(20.0, 0.0), (20.0, 9.0), (10.0, 9.0)]),
+                corridor('C', &[(10.0, 0.0), (10.0, 9.0)]),
+            ],
+        };
+        let places = graph.labelled_places();
+        let label = |x, y| places.label_at(&Point2::new(x, y));
+        assert_eq!(label(5.0, 0.5), Some("corridor"));
+        assert_eq!(label(10.0, 1.5), Some("bifurcation"));
+        assert_eq!(label(20.0, 0.0), Some("corner"));
+        assert_eq!(label(10.0, 9.0), Some("corner"));
+        assert_eq!(label(10.0, 4.5), Some("corridor"));
+        assert_eq!(label(5.0, 5.0), None);
     }
 }

@@ -7,7 +7,7 @@ mod icp_baseline;
 mod localization;
 mod pictures;
 mod published;
-mod scenarios;
+pub(in crate::cli) mod scenarios;
 mod static_buildings;
 mod text_sweep;
 

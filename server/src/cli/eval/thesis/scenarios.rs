@@ -4,6 +4,8 @@
 //! Who may follow whom in Table 4.1 determines how the corridors hang together; their proportions are ours.
 
 use anyhow::Result;
+use clap::ValueEnum;
+use locution_engine::formats::LabelledPlaces;
 use locution_engine::geometry::Point2;
 use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 use rand::{RngExt, SeedableRng};
@@ -53,9 +55,34 @@ fn drive(
         .collect()
 }
 
-/// Scenario A of chapter 4: four adjacent loops of 44, 58, 64 and 78 m.
-pub(super) fn four_loops() -> Result<Scenario> {
-    // Corridors A to D are the outer corners, E to H the spokes that meet in the middle.
+/// A floor of chapter 4, of which is known what kind of place each spot is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(in crate::cli) enum Plan {
+    /// Four adjacent loops of 44 to 78 m.
+    FourLoops,
+    /// Three nested loops, the largest of 88 m.
+    NestedLoops,
+    /// Two adjacent loops of 60 and 90 m.
+    TwoLoops,
+}
+
+impl Plan {
+    /// The floor as a world, and what its places are.
+    ///
+    /// # Errors
+    /// The world cannot be made.
+    pub(in crate::cli) fn draw(self) -> Result<(World, LabelledPlaces)> {
+        let (graph, size_m) = match self {
+            Self::FourLoops => four_loops_graph(),
+            Self::NestedLoops => nested_loops_graph(),
+            Self::TwoLoops => two_loops_graph(),
+        };
+        Ok((floor(&graph, size_m)?, graph.labelled_places()))
+    }
+}
+
+/// Corridors A to D are the outer corners, E to H the spokes that meet in the middle.
+fn four_loops_graph() -> (CorridorGraph, (f64, f64)) {
     let corridor = |letter, list: &[(f64, f64)], width_m| Corridor { letter, points: points(list), width_m };
     let graph = CorridorGraph {
         corridors: vec![
@@ -69,16 +96,10 @@ pub(super) fn four_loops() -> Result<Scenario> {
             corridor('H', &[(13.0, 0.0), (13.0, 9.0)], 1.8),
         ],
     };
-    let route = "ABCD ABCH GCDA BCHG BADC BABH GCDA BCHE DCGH DABC DEGB FEAB CHGB FHDA BCDE GBFE ABCH GBFH ABCD EGBF \
-                 EABC HGBF HDAB CDEG CHGB FEAB CDAF HCGH DEGB ADCB FHDE GCDA BCHG BFED CBAD HEDC GHDA FGBA EHC B \
-                 FDCG HDAB CDEG BFEA BCHG BFHD ABCD EGBF EABC HGBF HDAB CDEG BFEA B";
-    let world = floor(&graph, (33.0, 28.0))?;
-    let runs = drive(&world, &[graph.waypoints(route)?], &pioneer(0), 401)?;
-    Ok(Scenario { name: "A", what: "four adjacent loops of 44 to 78 m, one run", runs })
+    (graph, (33.0, 28.0))
 }
 
-/// Scenario B of chapter 4: three nested loops, the largest of 88 m; very symmetric, as the thesis says of its own.
-pub(super) fn nested_loops() -> Result<Scenario> {
+fn nested_loops_graph() -> (CorridorGraph, (f64, f64)) {
     let corridor = |letter, list: &[(f64, f64)]| Corridor { letter, points: points(list), width_m: 1.8 };
     let graph = CorridorGraph {
         corridors: vec![
@@ -96,16 +117,10 @@ pub(super) fn nested_loops() -> Result<Scenario> {
             corridor('I', &[(16.0, 10.0), (16.0, 7.0), (12.0, 7.0), (12.0, 3.5)]),
         ],
     };
-    let route = "AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHLK JIEBCD \
-                 AFGHLK JIEFGD ABCHEF KLIJGD ABCHEF GDABCH IJKLEF GDABCH LKJIEF GDABCH IJKLEF GDABCH IJKLIJ GDAFGH \
-                 EBCDAF KLIJGH EBCDAF GHIJKL EBCDAF GHIJKL EBCDAF GHEFKL IJGDAB CHE";
-    let world = floor(&graph, (24.0, 20.0))?;
-    let runs = drive(&world, &[graph.waypoints(route)?], &pioneer(0), 402)?;
-    Ok(Scenario { name: "B", what: "three nested loops, the largest of 88 m, one run", runs })
+    (graph, (24.0, 20.0))
 }
 
-/// Scenario C of chapter 4: two adjacent loops of 60 and 90 m in four short runs.
-pub(super) fn two_loops() -> Result<Scenario> {
+fn two_loops_graph() -> (CorridorGraph, (f64, f64)) {
     let corridor = |letter, list: &[(f64, f64)], width_m| Corridor { letter, points: points(list), width_m };
     let graph = CorridorGraph {
         corridors: vec![
@@ -116,6 +131,34 @@ pub(super) fn two_loops() -> Result<Scenario> {
             corridor('C', &[(39.0, 9.0), (39.0, 0.0), (12.0, 0.0)], 1.8),
         ],
     };
+    (graph, (39.0, 18.0))
+}
+
+/// Scenario A of chapter 4: four adjacent loops of 44, 58, 64 and 78 m.
+pub(super) fn four_loops() -> Result<Scenario> {
+    let (graph, size_m) = four_loops_graph();
+    let route = "ABCD ABCH GCDA BCHG BADC BABH GCDA BCHE DCGH DABC DEGB FEAB CHGB FHDA BCDE GBFE ABCH GBFH ABCD EGBF \
+                 EABC HGBF HDAB CDEG CHGB FEAB CDAF HCGH DEGB ADCB FHDE GCDA BCHG BFED CBAD HEDC GHDA FGBA EHC B \
+                 FDCG HDAB CDEG BFEA BCHG BFHD ABCD EGBF EABC HGBF HDAB CDEG BFEA B";
+    let world = floor(&graph, size_m)?;
+    let runs = drive(&world, &[graph.waypoints(route)?], &pioneer(0), 401)?;
+    Ok(Scenario { name: "A", what: "four adjacent loops of 44 to 78 m, one run", runs })
+}
+
+/// Scenario B of chapter 4: three nested loops, the largest of 88 m; very symmetric, as the thesis says of its own.
+pub(super) fn nested_loops() -> Result<Scenario> {
+    let (graph, size_m) = nested_loops_graph();
+    let route = "AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHIJ KLEBCD AFGHLK JIEBCD \
+                 AFGHLK JIEFGD ABCHEF KLIJGD ABCHEF GDABCH IJKLEF GDABCH LKJIEF GDABCH IJKLEF GDABCH IJKLIJ GDAFGH \
+                 EBCDAF KLIJGH EBCDAF GHIJKL EBCDAF GHIJKL EBCDAF GHEFKL IJGDAB CHE";
+    let world = floor(&graph, size_m)?;
+    let runs = drive(&world, &[graph.waypoints(route)?], &pioneer(0), 402)?;
+    Ok(Scenario { name: "B", what: "three nested loops, the largest of 88 m, one run", runs })
+}
+
+/// Scenario C of chapter 4: two adjacent loops of 60 and 90 m in four short runs.
+pub(super) fn two_loops() -> Result<Scenario> {
+    let (graph, size_m) = two_loops_graph();
     let routes = [
         "DEBCEA DEBCEA DEBC",
         "DEBCEA DEBCEA DEBCEA DEBC",
@@ -123,7 +166,7 @@ pub(super) fn two_loops() -> Result<Scenario> {
         "DEADEB CEBCEA DEADE",
     ];
     let routes = routes.iter().map(|route| graph.waypoints(route)).collect::<Result<Vec<_>>>()?;
-    let world = floor(&graph, (39.0, 18.0))?;
+    let world = floor(&graph, size_m)?;
     // The real one: a few people walk by.
     Ok(Scenario {
         name: "C",
