@@ -37,7 +37,8 @@ pub struct ChangesConfig {
     /// An obstacle within this distance of one in the other set has not changed: poses and walls are not sharper,
     /// metres.
     pub tolerance_m: f64,
-    /// Scans that must have judged a cell in each set.
+    /// Scans that must agree on a cell: that saw a return in it in the one set, and judged it in the other. A person who
+    /// walks by leaves fewer returns.
     pub num_scans_min: u16,
     /// A cell is surely free when at most this share of its scans saw a return in it.
     pub free_share_max: f64,
@@ -185,9 +186,7 @@ fn changed_cells(
     };
     occupied
         .seen_cells()
-        .filter(|(_, counts)| {
-            num_scans(*counts) >= u32::from(config.num_scans_min) && is_occupied(*counts, config)
-        })
+        .filter(|(_, counts)| counts.num_hits >= config.num_scans_min && is_occupied(*counts, config))
         .filter_map(|(cell, counts)| {
             let other = free.counts(cell);
             let is_free = num_scans(other) >= u32::from(config.num_scans_min)
