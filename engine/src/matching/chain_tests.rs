@@ -260,13 +260,16 @@ fn the_dynamic_programme_finds_what_enumeration_finds() {
         let (relation, gap) =
             if is_same_run { (Relation::SameRun, Some(7)) } else { (Relation::DifferentRuns, None) };
         let texts = (Lattice::from_words(earlier).unwrap(), Lattice::from_words(&later).unwrap());
-        for min_words in 1..=4 {
-            let config = config(&[1000, 1000, min_words], 7);
+        for (level, min_words) in (0..=2).flat_map(|level| (1..=4).map(move |min_words| (level, min_words))) {
+            // Only one level finds anything here, so its words and its threshold alone decide.
+            let mut thresholds = [1000; 3];
+            thresholds[usize::from(level)] = min_words;
+            let config = config(&thresholds, 7);
             let chains = find_chains(&texts.0, &texts.1, relation, &config);
             for direction in [Direction::Same, Direction::Opposite] {
                 let reference = Enumeration {
-                    earlier: earlier.iter().collect(),
-                    later: later.iter().collect(),
+                    earlier: earlier.iter().filter(|word| word.id.level <= level).collect(),
+                    later: later.iter().filter(|word| word.id.level <= level).collect(),
                     direction,
                     gap,
                     tolerance: config.tolerance,
@@ -286,7 +289,7 @@ fn the_dynamic_programme_finds_what_enumeration_finds() {
                     assert!(found.insert(key, chain.pairs.len()).is_none(), "two chains end at {key:?}");
                 }
                 num_long += found.values().filter(|&&length| length >= 3).count();
-                assert_eq!(found, expected, "round {round}, {direction:?}, at least {min_words} words");
+                assert_eq!(found, expected, "round {round}, {direction:?}, level {level}, {min_words} words");
             }
         }
     }
@@ -336,6 +339,24 @@ fn texts_in_a_row_have_the_chains_of_each() {
     }
     assert!(num_found > 100, "{num_found} chains test little");
     assert!(find_chains_in(&[], &Lattice::default(), &config).is_empty());
+}
+
+#[test]
+fn every_level_decides_by_its_own_threshold() {
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let mut num_found = 0;
+    for round in 0..30 {
+        let text = Lattice::from_words(&random_text(&mut rng, 30, 2 + (round % 2) as u8, 2)).unwrap();
+        let pairs_of = |thresholds: &[u16]| -> BTreeSet<Vec<(WordId, WordId)>> {
+            let chains = find_chains(&text, &text, Relation::SameRun, &config(thresholds, 7));
+            chains.into_iter().map(|chain| chain.pairs).collect()
+        };
+        let together = pairs_of(&[2, 4, 5]);
+        let apart = [pairs_of(&[2, 1000, 1000]), pairs_of(&[1000, 4, 1000]), pairs_of(&[1000, 1000, 5])];
+        assert_eq!(together, apart.iter().flatten().cloned().collect(), "round {round}");
+        num_found += together.len();
+    }
+    assert!(num_found > 100, "{num_found} chains test little");
 }
 
 #[test]

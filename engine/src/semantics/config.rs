@@ -9,8 +9,9 @@ use crate::config::ConfigError;
 /// How places are labelled from the map.
 ///
 /// The lengths of forks and bends, the two limits of corners and the smoothing were chosen on `aces`, `intel`,
-/// `mit-killian` and three simulated floors, where a range of values does about equally well. What they are worth on a
-/// building that had no say in them was measured by leaving one out at a time: docs/evaluation.md has the figures.
+/// `mit-killian` and three simulated floors. The limits of corners sit on a narrow optimum: with 0.88 instead of 0.87 the
+/// precision of corners on `intel` falls from 87 to 28 %. What all of them are worth on a building that had no say in
+/// them was measured by leaving one out at a time: docs/evaluation.md has the figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SemanticsConfig {

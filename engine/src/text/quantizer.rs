@@ -167,6 +167,9 @@ impl DensityHistogram {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
 
     #[test]
@@ -194,6 +197,40 @@ mod tests {
             Quantizer::mean_shift(&histogram_of(&[(0.3, 500), (0.5, 200), (0.8, 100)]), 0.03, 0.01);
         assert_eq!(quantizer.num_classes(), 3);
         assert_eq!([0.3, 0.5, 0.8].map(|density| quantizer.class_of(density)), [0, 1, 2]);
+    }
+
+    #[test]
+    fn classes_end_where_the_smoothed_histogram_is_lowest() {
+        const BANDWIDTH: f64 = 0.03;
+        let mut rng = ChaCha8Rng::seed_from_u64(35);
+        for _ in 0..50 {
+            let num_clusters = rng.random_range(1..=5usize);
+            let mut densities: Vec<f32> = Vec::new();
+            for cluster in 0..num_clusters {
+                let middle = 0.1 + 0.18 * cluster as f32 + rng.random_range(-0.03..0.03f32);
+                let count = rng.random_range(30..500);
+                densities.extend((0..count).map(|_| middle + rng.random_range(-0.015..0.015f32)));
+            }
+            let mut histogram = DensityHistogram::default();
+            densities.iter().for_each(|&density| histogram.add(density));
+            // The reference climbs nothing: it samples the sum of a Gaussian per observation, and looks where it dips.
+            let smoothed = |at: f64| -> f64 {
+                let gauss = |density: &f32| (-0.5 * ((f64::from(*density) - at) / BANDWIDTH).powi(2)).exp();
+                densities.iter().map(gauss).sum()
+            };
+            let samples: Vec<f64> =
+                (0..=NUM_BINS).map(|edge| smoothed(edge as f64 / NUM_BINS as f64)).collect();
+            let dips: Vec<usize> = (1..NUM_BINS)
+                .filter(|&edge| samples[edge] < samples[edge - 1] && samples[edge] <= samples[edge + 1])
+                .collect();
+            assert_eq!(dips.len() + 1, num_clusters, "the clusters lie apart");
+            let quantizer = Quantizer::mean_shift(&histogram, BANDWIDTH, 0.0);
+            assert_eq!(quantizer.num_classes(), num_clusters);
+            for (boundary, dip) in quantizer.boundaries.iter().zip(dips) {
+                let distance_bins = (f64::from(*boundary) * NUM_BINS as f64 - dip as f64).abs();
+                assert!(distance_bins <= 2.0, "a boundary lies {distance_bins} bins from the dip");
+            }
+        }
     }
 
     #[test]
