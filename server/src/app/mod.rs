@@ -21,6 +21,7 @@ use crate::storage::Storage;
 mod builds;
 pub mod changes;
 mod error;
+pub mod examples;
 pub mod exports;
 mod grids;
 mod ingest;
@@ -55,6 +56,7 @@ pub use runs::{NewRun, RunInfo};
 pub use site::{Site, SiteInfo, SiteState, TextConfig};
 pub use trajectory::{Frame, StampedPose, Trajectory};
 
+use examples::PlaceIndexes;
 use grids::GridKey;
 use localisations::Localisations;
 use open_runs::OpenRuns;
@@ -76,6 +78,7 @@ pub struct App {
     drawing: tokio::sync::Mutex<()>,
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
     localisations: Localisations,
+    place_indexes: PlaceIndexes,
 }
 
 impl App {
@@ -89,6 +92,7 @@ impl App {
             drawing: tokio::sync::Mutex::default(),
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             localisations: Localisations::default(),
+            place_indexes: PlaceIndexes::default(),
             config,
             storage,
             sites: Mutex::default(),
