@@ -8,6 +8,7 @@ use crate::grid::LocalMapConfig;
 use crate::localization::LocalizationConfig;
 use crate::mapping::MappingConfig;
 use crate::matching::MatchingConfig;
+use crate::recall::RecallConfig;
 use crate::registration::RefinerConfig;
 use crate::sampling::SamplingConfig;
 use crate::semantics::SemanticsConfig;
@@ -42,6 +43,8 @@ pub struct EngineConfig {
     pub mapping: MappingConfig,
     /// How robots are found in the map.
     pub localization: LocalizationConfig,
+    /// How short recordings are looked for.
+    pub recall: RecallConfig,
     /// How places are labelled.
     pub semantics: SemanticsConfig,
 }
@@ -56,6 +59,7 @@ impl EngineConfig {
         self.matching.validate("matching")?;
         self.mapping.validate("mapping")?;
         self.localization.validate("localization")?;
+        self.recall.validate("recall")?;
         self.semantics.validate("semantics")?;
         Ok(())
     }

@@ -6,7 +6,8 @@
 //!
 //! Read the rooms in the order of the data flow:
 //! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] →
-//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`localization`] and [`semantics`], which read a map, and [`formats`],
+//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`localization`],
+//! [`recall`] and [`semantics`], which read a map, and [`formats`],
 //! [`simulation`] and [`evaluation`], which feed and judge it.
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
@@ -22,6 +23,7 @@ pub mod localization;
 pub mod mapping;
 pub mod matching;
 pub mod pose_graph;
+pub mod recall;
 pub mod registration;
 pub mod retrieval;
 pub mod sampling;

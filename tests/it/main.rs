@@ -6,6 +6,7 @@ mod bad_input;
 mod batches;
 mod changes;
 mod crash;
+mod documentation;
 mod maps;
 mod sites;
 mod words;

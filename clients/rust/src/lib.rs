@@ -35,7 +35,7 @@ mod upload;
 
 pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
-pub use localisations::{Hypothesis, Localisation, LocalisationState};
+pub use localisations::{ExampleAnswer, Hypothesis, Localisation, LocalisationState};
 pub use types::{
     BatchAnswer, Geometry, Job, LabelledStretch, MatchInterval, NewRun, Observation, PlaceMatch, Pose,
     RunStatus, Scan, SiteStatus, StampedPose, Trajectory, Word, WordId,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::client::{Body, Client};
 use crate::error::ClientError;
-use crate::types::{NewRun, Pose, Scan};
+use crate::types::{Geometry, NewRun, Pose, Scan};
 use crate::upload::{Encoding, batch_body};
 
 /// How sure the answer is.
@@ -31,6 +31,26 @@ pub struct Hypothesis {
     pub covariance: [[f64; 3]; 3],
     /// Probability of this place.
     pub probability: f64,
+}
+
+/// Where a short recording ends, in one site.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[serde(default)]
+pub struct ExampleAnswer {
+    /// The site.
+    pub site: String,
+    /// `Lost` means "not here".
+    pub state: LocalisationState,
+    /// Metres that the recording drives.
+    pub travel_m: f64,
+    /// Places where it may end, likeliest first.
+    pub places: Vec<Hypothesis>,
+}
+
+#[derive(Serialize)]
+struct ExampleQuery<'a> {
+    geometry: &'a Geometry,
+    scans: &'a [Scan],
 }
 
 /// A localisation as it stands.
@@ -70,6 +90,20 @@ impl Client {
     ) -> Result<Localisation, ClientError> {
         let path = format!("/v1/sites/{site}/localisations/{localisation}/batches");
         self.json(Method::POST, &path, batch_body(first_sequence, scans, Encoding::Cbor)?).await
+    }
+
+    /// Asks where in a site a short recording was made; nothing of it is stored.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn query_example(
+        &self,
+        site: &str,
+        geometry: &Geometry,
+        scans: &[Scan],
+    ) -> Result<ExampleAnswer, ClientError> {
+        let body = Body::cbor(&ExampleQuery { geometry, scans })?;
+        self.json(Method::POST, &format!("/v1/sites/{site}/queries/example"), body).await
     }
 
     /// Closes a localisation.

@@ -5,8 +5,9 @@
 //! matches ─► claims: pairs of observations said to be one place ────────────────┴► precision, recall, curve
 //! ```
 //! Beside it: map error against hand-verified relations, trajectory error against the truth, label confusion and the
-//! outcome of localisations. Nothing here knows how the answers were made.
+//! outcome of localisations and of questions by example. Nothing here knows how the answers were made.
 
+mod examples;
 mod labels;
 mod localization;
 mod map_error;
@@ -16,6 +17,7 @@ mod summary;
 mod trajectory_error;
 mod truth_join;
 
+pub use examples::{ExampleReport, ExampleTrial, LatencyMs, ReliabilityBin, judge_examples};
 pub use labels::{LabelReport, LabelScore, LabelledObservation, judge_labels};
 pub use localization::{
     LocalizationReport, LocalizationTrial, MetresToConverge, TrialOutcome, judge_localization,

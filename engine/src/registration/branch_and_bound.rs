@@ -40,6 +40,13 @@ struct Block {
     y: i32,
 }
 
+/// The best so far.
+struct Best {
+    /// What another must exceed.
+    worth: u32,
+    block: Option<Block>,
+}
+
 impl SearchPyramid {
     /// The pyramid over the hits of a grid, with cells twice as large: the alignment that follows finds the rest.
     pub fn new(grid: &EvidenceGrid) -> Self {
@@ -57,6 +64,17 @@ impl SearchPyramid {
     /// surface. Ties go to the first in a fixed order.
     pub fn best_pose(
         &self,
+        points: &[Point2],
+        window: &SearchWindow,
+        turn_step_rad: f64,
+    ) -> Option<(Pose2, f64)> {
+        self.best_pose_above(0.0, points, window, turn_step_rad)
+    }
+
+    /// The same, and none when the worth is no larger than this share of the highest possible, which is known soon.
+    pub fn best_pose_above(
+        &self,
+        share: f64,
         points: &[Point2],
         window: &SearchWindow,
         turn_step_rad: f64,
@@ -81,14 +99,15 @@ impl SearchPyramid {
             }
         }
         blocks.sort_by_key(|block| (std::cmp::Reverse(block.bound), block.turn_idx, block.y, block.x));
-        let mut best: Option<Block> = None;
+        let least = (share * 2.0 * points.len() as f64) as u32;
+        let mut best = Best { worth: least, block: None };
         for block in &blocks {
-            if block.bound <= best.map_or(0, |best| best.bound) {
+            if block.bound <= best.worth {
                 break;
             }
             self.descend(top, block, &placed[block.turn_idx], half_cells, &mut best);
         }
-        best.map(|best| {
+        best.block.map(|best| {
             let pose = Pose2::new(
                 window.centre.x + f64::from(best.x) * self.cell_m,
                 window.centre.y + f64::from(best.y) * self.cell_m,
@@ -123,17 +142,10 @@ impl SearchPyramid {
         covariance / total
     }
 
-    fn descend(
-        &self,
-        level: usize,
-        block: &Block,
-        cells: &[(i32, i32)],
-        half_cells: i32,
-        best: &mut Option<Block>,
-    ) {
+    fn descend(&self, level: usize, block: &Block, cells: &[(i32, i32)], half_cells: i32, best: &mut Best) {
         if level == 0 {
-            if block.bound > best.map_or(0, |best| best.bound) {
-                *best = Some(*block);
+            if block.bound > best.worth {
+                *best = Best { worth: block.bound, block: Some(*block) };
             }
             return;
         }
@@ -147,7 +159,7 @@ impl SearchPyramid {
         }
         children.sort_by_key(|child| std::cmp::Reverse(child.bound));
         for child in &children {
-            if child.bound <= best.map_or(0, |best| best.bound) {
+            if child.bound <= best.worth {
                 break;
             }
             self.descend(level - 1, child, cells, half_cells, best);

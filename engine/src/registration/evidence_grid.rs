@@ -48,6 +48,11 @@ impl EvidenceGrid {
         &self.hits
     }
 
+    /// The same to be filled from elsewhere.
+    pub fn hit_worth_mut(&mut self) -> &mut [u8] {
+        &mut self.hits
+    }
+
     /// Marks what one beam says; beams may begin and end outside.
     pub fn add_beam(&mut self, from: &Point2, to: &Point2) {
         let length_m = from.distance(to);

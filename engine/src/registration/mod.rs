@@ -3,6 +3,7 @@
 //! [`OdometryRefiner`] matches scans against the recent dozen metres and hands out keyframes. Everything rests on
 //! two parts: a correlative search that finds the right valley, and point-to-line steps that find its bottom.
 
+mod area;
 mod branch_and_bound;
 mod config;
 mod correlative;
@@ -16,6 +17,7 @@ mod surface_map;
 #[cfg(test)]
 pub(crate) mod testing;
 
+pub use area::{Area, AreaBuilder, AreaFit, AreaSearch};
 pub use branch_and_bound::SearchWindow;
 pub use config::{OdometryNoise, RefinerConfig, SubmapConfig};
 pub(crate) use refiner::rotated;

@@ -45,14 +45,7 @@ pub fn refine_from(
     window: &SearchWindow,
     config: &SubmapConfig,
 ) -> Option<SubmapFit> {
-    let settings = AlignmentSettings {
-        noise_m: config.noise_m,
-        outlier_m: config.outlier_m,
-        first_outlier_m: config.first_outlier_m,
-        min_count: config.min_count,
-        max_iterations: config.max_iterations,
-        correlated_returns: config.correlated_returns,
-    };
+    let settings = alignment_settings(config);
     let by_place = 1.0 / (window.half_m * window.half_m).max(0.01);
     let by_turn = 1.0 / (window.half_turn_rad * window.half_turn_rad).max(1e-4);
     let prior = Matrix3::from_diagonal(&nalgebra::Vector3::new(by_place, by_place, by_turn));
@@ -81,6 +74,18 @@ pub fn refine_from(
     })
 }
 
+/// How returns are pulled onto surfaces.
+pub(super) fn alignment_settings(config: &SubmapConfig) -> AlignmentSettings {
+    AlignmentSettings {
+        noise_m: config.noise_m,
+        outlier_m: config.outlier_m,
+        first_outlier_m: config.first_outlier_m,
+        min_count: config.min_count,
+        max_iterations: config.max_iterations,
+        correlated_returns: config.correlated_returns,
+    }
+}
+
 /// What one submap says of the returns of another.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Tally {
@@ -96,7 +101,8 @@ impl Tally {
         f64::from(self.num_contradicted) / f64::from((self.num_confirmed + self.num_contradicted).max(1))
     }
 
-    fn count(grid: &EvidenceGrid, points: &[Point2], grid_from_points: &Pose2) -> Self {
+    /// Asks a grid about points.
+    pub fn count(grid: &EvidenceGrid, points: &[Point2], grid_from_points: &Pose2) -> Self {
         let mut tally = Self::default();
         let (sin, cos) = grid_from_points.theta.sin_cos();
         for point in points {

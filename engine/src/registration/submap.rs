@@ -63,6 +63,16 @@ impl Submap {
     }
 }
 
+impl Submap {
+    /// At most `num_max` points for a search, evenly chosen among those within `reach_m` of the origin.
+    pub fn search_points(&self, reach_m: f64, num_max: usize) -> Vec<Point2> {
+        let near: Vec<Point2> =
+            self.coarse_points.iter().filter(|point| point.x.hypot(point.y) <= reach_m).copied().collect();
+        let count = near.len().min(num_max);
+        (0..count).map(|k| near[k * near.len() / count]).collect()
+    }
+}
+
 /// One point for every square of `spacing_m` that holds any, within `radius_m`, in order of their first appearance.
 fn spread(points: &[Point2], spacing_m: f64, radius_m: f64) -> Vec<Point2> {
     let mut seen = std::collections::BTreeSet::new();

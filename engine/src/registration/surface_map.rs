@@ -78,6 +78,11 @@ impl SurfaceMap {
         Self { cell_m, cells: HashMap::default() }
     }
 
+    /// Bytes that the cells take, about.
+    pub fn num_bytes(&self) -> usize {
+        self.cells.capacity() * (size_of::<(CellKey, Moments)>() + 1)
+    }
+
     /// Adds a point.
     pub fn insert(&mut self, point: &Point2) {
         let (cell, x, y) = self.locate(point);

@@ -62,7 +62,11 @@ pub(super) async fn load_run(
 
 impl App {
     /// Builds a new map version of everything stored now, and serves it.
-    pub(super) async fn build(&self, site: &Arc<Site>, progress: &Progress) -> Result<String, AppError> {
+    pub(super) async fn build(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        progress: &Progress,
+    ) -> Result<String, AppError> {
         let started = Instant::now();
         self.renew_texts(site, progress).await?;
         progress.at(0.0, "reading the runs");
@@ -82,6 +86,9 @@ impl App {
         let duration_s = started.elapsed().as_secs_f64();
         let record = site.write_map(&map, &labels, &written, duration_s).await?;
         site.serve_map(record.version, self.num_versions_kept()).await?;
+        // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
+        progress.at(0.95, "preparing questions by example");
+        self.place_index(site, &record).await?;
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
         Ok(format!(
             "map version {}: {} runs in {} components, {} of {} matches verified, {:.1} s",

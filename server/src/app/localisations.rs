@@ -224,30 +224,6 @@ impl App {
         Ok(Arc::clone(session))
     }
 
-    /// Places of a short recording that is not stored, and whether it is here at all.
-    ///
-    /// # Errors
-    /// Those of the storage; [`AppError::Invalid`] for scans that cannot be.
-    pub async fn find_places(
-        &self,
-        site: &Site,
-        geometry: &ScanGeometry,
-        batch: NewBatch,
-    ) -> Result<LocalisationInfo, AppError> {
-        let map = site.map(None).await?;
-        let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = batch.checked(geometry, 0, None, step_max_m)?;
-        let mut search = self.new_search(site, &map, geometry).await?;
-        let map_version = map.version;
-        on_blocking_thread(move || {
-            search.push(&scans);
-            let (state, travel_m, hypotheses) = search.estimate();
-            let next_sequence = search.next_sequence;
-            LocalisationInfo { id: 0, map_version, state, next_sequence, travel_m, hypotheses }
-        })
-        .await
-    }
-
     async fn new_search(
         &self,
         site: &Site,

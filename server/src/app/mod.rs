@@ -21,6 +21,7 @@ use crate::storage::Storage;
 mod builds;
 pub mod changes;
 mod error;
+pub mod examples;
 pub mod exports;
 mod grids;
 mod ingest;
@@ -54,6 +55,7 @@ pub use runs::{NewRun, RunInfo};
 pub use site::{Site, SiteInfo, SiteState, TextConfig};
 pub use trajectory::{Frame, StampedPose, Trajectory};
 
+use examples::PlaceIndexes;
 use grids::GridKey;
 use localisations::Localisations;
 use open_runs::OpenRuns;
@@ -75,6 +77,7 @@ pub struct App {
     drawing: tokio::sync::Mutex<()>,
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
     localisations: Localisations,
+    place_indexes: PlaceIndexes,
 }
 
 impl App {
@@ -88,6 +91,7 @@ impl App {
             drawing: tokio::sync::Mutex::default(),
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             localisations: Localisations::default(),
+            place_indexes: PlaceIndexes::default(),
             config,
             storage,
             sites: Mutex::default(),

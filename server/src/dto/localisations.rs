@@ -1,6 +1,7 @@
 //! Localisations and queries by example on the wire.
 
 use locution_engine::localization::LocalizationState;
+use locution_engine::mapping::Direction;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
@@ -8,6 +9,7 @@ use super::batches::ScanDto;
 use super::common::PoseDto;
 use super::runs::GeometryDto;
 use crate::app::NewBatch;
+use crate::app::examples::{ExampleInfo, ExamplePlace};
 use crate::app::localisations::LocalisationInfo;
 use crate::error::ApiError;
 
@@ -129,18 +131,85 @@ pub struct ExampleAnswerDto {
     /// Metres that the example drives.
     pub travel_m: f64,
     /// Places where the robot was at the end of the example, likeliest first.
-    pub places: Vec<HypothesisDto>,
+    pub places: Vec<ExamplePlaceDto>,
 }
 
-impl ExampleAnswerDto {
-    /// The answer of a site.
-    pub fn new(site: String, info: &LocalisationInfo) -> Self {
+/// A place where an example may end.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ExamplePlaceDto {
+    /// The component of the map whose frame the pose is in.
+    pub component: u32,
+    /// Where.
+    pub map_from_robot: PoseDto,
+    /// Covariance of (x, y, θ), row by row; long along a plain corridor.
+    pub covariance: [[f64; 3]; 3],
+    /// Probability, over all sites asked; what is missing to 1 is that of being elsewhere.
+    pub probability: f64,
+    /// The run whose stretch reads like the example.
+    pub run: String,
+    /// First and last observation of that stretch.
+    pub observations: [u32; 2],
+    /// Which way it was driven: `same` or `opposite`.
+    pub direction: String,
+    /// What speaks for and against the place.
+    pub evidence: ExampleEvidenceDto,
+}
+
+/// What speaks for and against a place, by the stage that found it.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ExampleEvidenceDto {
+    /// What proposed the place: `profile`.
+    pub channel: String,
+    /// Standard deviations by which the density profiles differ less than over the whole site.
+    pub profile_score: f64,
+    /// 1 when all densities are equal.
+    pub resemblance: f64,
+    /// Share of the outline that the search laid onto surfaces.
+    pub outline: f64,
+    /// Share of the example's returns about which the map has an opinion.
+    pub coverage: f64,
+    /// Of these, the share that lie where the map saw free space.
+    pub contradicted: f64,
+    /// Share of the map's surfaces there that the example saw through.
+    pub contradicts: f64,
+}
+
+impl From<ExampleInfo> for ExampleAnswerDto {
+    fn from(info: ExampleInfo) -> Self {
         Self {
-            site,
+            site: info.site,
             map_version: info.map_version,
             state: info.state.into(),
             travel_m: info.travel_m,
-            places: hypotheses_of(info),
+            places: info.places.into_iter().map(ExamplePlaceDto::from).collect(),
+        }
+    }
+}
+
+impl From<ExamplePlace> for ExamplePlaceDto {
+    fn from(place: ExamplePlace) -> Self {
+        let ExamplePlace { found, run, probability } = place;
+        let direction = match found.direction {
+            Direction::Same => "same",
+            Direction::Opposite => "opposite",
+        };
+        Self {
+            component: found.component,
+            map_from_robot: found.map_from_robot.into(),
+            covariance: found.covariance.transpose().into(),
+            probability,
+            run,
+            observations: [found.earlier.first, found.earlier.last],
+            direction: direction.into(),
+            evidence: ExampleEvidenceDto {
+                channel: "profile".into(),
+                profile_score: found.evidence.profile_score,
+                resemblance: found.evidence.resemblance,
+                outline: found.evidence.search_share,
+                coverage: found.evidence.fit.coverage,
+                contradicted: found.evidence.fit.contradicted,
+                contradicts: found.evidence.fit.contradicts,
+            },
         }
     }
 }

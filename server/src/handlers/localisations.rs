@@ -81,8 +81,9 @@ pub async fn query_example(
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<ExampleAnswerDto>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.find_places(&site, &geometry, query.batch()?).await?;
-    Ok(Json(ExampleAnswerDto::new(site.name().to_string(), &info)))
+    let answers = state.app.find_example(&[site], &geometry, query.batch()?).await?;
+    let answer = answers.into_iter().next().ok_or_else(|| AppError::internal("a site without an answer"))?;
+    Ok(Json(answer.into()))
 }
 
 /// Where was this recorded, of all sites that the key may see? Sites without a map are passed over.
@@ -96,16 +97,7 @@ pub async fn query_example_everywhere(
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let batch = query.batch()?;
-    let mut answers = Vec::new();
-    for site in state.app.sites(|name| identity.may_see(name)).await? {
-        match state.app.find_places(&site, &geometry, batch.clone()).await {
-            Ok(info) => answers.push(ExampleAnswerDto::new(site.name().to_string(), &info)),
-            Err(AppError::NotReady { .. }) => {}
-            Err(error) => return Err(error.into()),
-        }
-    }
-    let best = |answer: &ExampleAnswerDto| answer.places.first().map_or(0.0, |place| place.probability);
-    answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
-    Ok(Json(answers))
+    let sites = state.app.sites(|name| identity.may_see(name)).await?;
+    let answers = state.app.find_example(&sites, &geometry, query.batch()?).await?;
+    Ok(Json(answers.into_iter().map(ExampleAnswerDto::from).collect()))
 }

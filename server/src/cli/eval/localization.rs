@@ -21,7 +21,7 @@ use crate::cli::recordings::{Recording, read_recording, read_truth, wire_geometr
 use crate::cli::upload::{UploadOptions, progress_bar, upload_recording};
 
 /// A start is only fair where the map has been: nearer than this to a mapped place.
-const MAPPED_M: f64 = 2.0;
+pub(super) const MAPPED_M: f64 = 2.0;
 
 /// The first truth belongs to the map's recording, the second to the other.
 #[derive(Debug, Args)]
@@ -56,10 +56,11 @@ pub struct LocalizationArguments {
 }
 
 /// A recording with a true pose for each scan that has one.
-struct Known {
-    recording: Recording,
-    truth: Vec<Option<Pose2>>,
-    travel_m: Vec<f64>,
+pub(super) struct Known {
+    pub recording: Recording,
+    pub truth: Vec<Option<Pose2>>,
+    /// Metres driven at each scan, by odometry.
+    pub travel_m: Vec<f64>,
 }
 
 #[derive(Serialize)]
@@ -77,7 +78,7 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
     let log = known(&arguments.log, &arguments.truth[1], &arguments.part)?;
     let began = std::time::Instant::now();
     let server = LocalServer::start().await?;
-    let mapped = build(&server, &map).await?;
+    let mapped = build(&server, &map, None).await?;
     let starts = starts(&log, &mapped, arguments);
     ensure!(
         !starts.is_empty(),
@@ -107,7 +108,8 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
     server.stop().await
 }
 
-fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
+/// Reads a part of a recording with its truth.
+pub(super) fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
     let &[from, to] = part else { anyhow::bail!("a part is two shares, such as 0,0.5") };
     ensure!((0.0..=1.0).contains(&from) && from < to && to <= 1.0, "a part is two rising shares of 0 to 1");
     let mut recording = read_recording(log, CarmenOptions::default())?;
@@ -125,7 +127,8 @@ fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
     Ok(Known { recording, truth, travel_m })
 }
 
-fn travel(log: &CarmenLog) -> Vec<f64> {
+/// Metres driven at each scan, by odometry.
+pub(super) fn travel(log: &CarmenLog) -> Vec<f64> {
     let mut driven_m = 0.0;
     let mut last: Option<Pose2> = None;
     log.scans
@@ -139,8 +142,12 @@ fn travel(log: &CarmenLog) -> Vec<f64> {
 }
 
 /// Sends the map's recording and answers pairs of (true, mapped) poses along it.
-async fn build(server: &LocalServer, map: &Known) -> Result<Vec<(Pose2, Pose2)>> {
-    server.client.put_site(SITE, None).await?;
+pub(super) async fn build(
+    server: &LocalServer,
+    map: &Known,
+    config: Option<&serde_json::Value>,
+) -> Result<Vec<(Pose2, Pose2)>> {
+    server.client.put_site(SITE, config).await?;
     let name = map.recording.name.as_str();
     let bar = progress_bar(&indicatif::MultiProgress::new(), name, map.recording.log.scans.len());
     let options = UploadOptions::default();
@@ -207,7 +214,7 @@ async fn trial(
 }
 
 /// A true pose in the map's frame, by the nearest mapped place: a map that is bent far away is right here.
-fn expected_pose(truth: &Pose2, mapped: &[(Pose2, Pose2)]) -> Pose2 {
+pub(super) fn expected_pose(truth: &Pose2, mapped: &[(Pose2, Pose2)]) -> Pose2 {
     let nearest = mapped.iter().min_by(|a, b| a.0.distance(truth).total_cmp(&b.0.distance(truth)));
     nearest.map_or(*truth, |(known, map_pose)| map_pose.compose(&known.between(truth)))
 }

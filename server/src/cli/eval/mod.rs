@@ -8,6 +8,7 @@ pub mod local_server;
 mod localization;
 mod map;
 mod plot;
+mod query;
 pub mod recognition;
 mod stroke_font;
 pub(in crate::cli) mod thesis;
@@ -29,6 +30,8 @@ enum What {
     Labels(labels::LabelsArguments),
     /// Robots switched on at random moments: found, wrongly sure or honestly unsure.
     Localization(localization::LocalizationArguments),
+    /// Short recordings that are not stored: found in the map, or honestly not here.
+    Query(query::QueryArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
     Thesis(thesis::ThesisArguments),
 }
@@ -45,6 +48,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Map(arguments) => map::run(arguments).await,
             What::Labels(arguments) => labels::run(arguments).await,
             What::Localization(arguments) => localization::run(arguments).await,
+            What::Query(arguments) => query::run(arguments).await,
             What::Thesis(arguments) => thesis::run(arguments),
         }
     })
