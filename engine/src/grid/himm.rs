@@ -114,8 +114,8 @@ impl RangeScale {
             // A reading of nothing is a fault of the sensor; it says neither free nor occupied.
             return BeamLimits::default();
         }
-        // Not a number, infinite or the sensor's maximum.
-        if !(f64::from(range_m) < self.range_max_m) || range_m == f32::INFINITY {
+        let is_return = range_m.is_finite() && f64::from(range_m) < self.range_max_m;
+        if !is_return {
             return self.no_return;
         }
         let range = f64::from(range_m) / self.resolution_m;
