@@ -172,7 +172,7 @@ fn invalid_geometry(error: locution_engine::config::ConfigError) -> AppError {
 }
 
 /// Gives the places of all sites their probabilities, which compete with one another and with being nowhere.
-fn settle(answers: &mut Vec<ExampleInfo>, config: &RecallConfig) {
+fn settle(answers: &mut [ExampleInfo], config: &RecallConfig) {
     let log_odds: Vec<f64> =
         answers.iter().flat_map(|answer| answer.places.iter().map(|place| place.found.log_odds)).collect();
     let mut probabilities = Calibration::probabilities(&log_odds).into_iter();

@@ -59,11 +59,14 @@ fn drive(
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(in crate::cli) enum Plan {
     /// Four adjacent loops of 44 to 78 m.
-    FourLoops,
+    #[value(name = "four-loops")]
+    Adjacent,
     /// Three nested loops, the largest of 88 m.
-    NestedLoops,
+    #[value(name = "nested-loops")]
+    Nested,
     /// Two adjacent loops of 60 and 90 m.
-    TwoLoops,
+    #[value(name = "two-loops")]
+    Pair,
 }
 
 impl Plan {
@@ -73,9 +76,9 @@ impl Plan {
     /// The world cannot be made.
     pub(in crate::cli) fn draw(self) -> Result<(World, LabelledPlaces)> {
         let (graph, size_m) = match self {
-            Self::FourLoops => four_loops_graph(),
-            Self::NestedLoops => nested_loops_graph(),
-            Self::TwoLoops => two_loops_graph(),
+            Self::Adjacent => four_loops_graph(),
+            Self::Nested => nested_loops_graph(),
+            Self::Pair => two_loops_graph(),
         };
         Ok((floor(&graph, size_m)?, graph.labelled_places()))
     }
