@@ -44,8 +44,8 @@ impl PlaceEvidence {
 
 /// Weights of a multinomial logistic model: every place against being nowhere in the map.
 ///
-/// The defaults were fitted to pieces of the second half of `mit-killian` in the map of its first half, and to pieces of
-/// other buildings there.
+/// The defaults were fitted to pieces of the second halves of `mit-killian`, `aces` and `intel` in the maps of their
+/// first halves, and to pieces of other buildings there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Calibration {
@@ -55,7 +55,7 @@ pub struct Calibration {
 
 impl Default for Calibration {
     fn default() -> Self {
-        Self { weights: [-9.5, -1.5, -1.5, 0.2, 0.1, 1.4] }
+        Self { weights: [-10.0, -1.8, -1.8, 0.0, 0.5, 1.1] }
     }
 }
 
