@@ -55,17 +55,13 @@ pub(super) fn below(planes: &Planes, limit: u8) -> u64 {
     if limit > 15 {
         return u64::MAX;
     }
-    let (mut less, mut equal) = (0, u64::MAX);
-    for bit in (0..4).rev() {
-        let plane = planes[bit];
-        if limit >> bit & 1 == 1 {
-            less |= equal & !plane;
-            equal &= plane;
-        } else {
-            equal &= !plane;
-        }
-    }
-    less
+    // The borrow of occupancy − limit.
+    planes.iter().enumerate().fold(
+        0,
+        |borrow, (bit, &plane)| {
+            if limit >> bit & 1 == 1 { !plane | borrow } else { !plane & borrow }
+        },
+    )
 }
 
 /// The occupancy of one cell.

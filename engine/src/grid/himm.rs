@@ -6,7 +6,7 @@
 
 use std::f64::consts::TAU;
 
-use super::field_of_view::{NUM_SECTORS, SECTOR_WIDTH, SECTORS_PER_QUADRANT, ViewCell, to_turns};
+use super::field_of_view::{NUM_SECTORS, SECTOR_WIDTH, to_turns};
 use super::local_map::for_each_word;
 use super::{Cell, LocalMap, LocalMapConfig};
 use crate::geometry::Pose2;
@@ -17,10 +17,10 @@ use crate::scan::ScanGeometry;
 struct BeamLimits {
     /// Cells below this lie before the reading.
     free_end: u32,
-    /// Cells from here...
+    /// Cells from here, not before `free_end`, lie around it...
     hit_begin: u32,
-    /// ...and below this lie around it.
-    hit_end: u32,
+    /// ...over this many squared distances.
+    hit_width: u32,
     /// Cells from here on are not touched.
     reach: u32,
 }
@@ -67,13 +67,14 @@ impl Laser {
 
     fn set_limits(&mut self, ranges_m: &[f32], config: &LocalMapConfig) {
         let scale = RangeScale::new(&self.geometry, config);
-        let num_ranges = self.geometry.num_ranges;
-        let read = ranges_m.iter().map(|&range_m| scale.limits_of(range_m));
-        let limits = read.chain(std::iter::repeat(BeamLimits::default())).take(num_ranges);
-        if self.geometry.angle_increment_rad > 0.0 {
-            self.limits.iter_mut().zip(limits).for_each(|(old, new)| *old = new);
-        } else {
-            self.limits[..num_ranges].iter_mut().rev().zip(limits).for_each(|(old, new)| *old = new);
+        let beams = &mut self.limits[..self.geometry.num_ranges];
+        // Readings that the scan does not have say nothing.
+        beams.fill(BeamLimits::default());
+        for (limits, &range_m) in beams.iter_mut().zip(ranges_m) {
+            *limits = scale.limits_of(range_m);
+        }
+        if self.geometry.angle_increment_rad < 0.0 {
+            beams.reverse();
         }
     }
 }
@@ -126,7 +127,8 @@ impl RangeScale {
         let free_end = rounded_up(near * near);
         let hit_end = rounded_up((far * far).min(self.radius * self.radius));
         let hit_begin = if range < self.hit_tolerance { 0 } else { (near * near) as u32 + 1 };
-        BeamLimits { free_end, hit_begin, hit_end, reach: free_end.max(hit_end) }
+        let hit_width = hit_end.saturating_sub(hit_begin);
+        BeamLimits { free_end, hit_begin, hit_width, reach: free_end.max(hit_end) }
     }
 }
 
@@ -171,44 +173,40 @@ impl LocalMap {
     fn cells_seen(&self, laser_cell: Cell, first_edge: u32) -> Vec<Seen> {
         // Made anew for each scan: kept, it would be a good part of what an open run weighs.
         let mut seen = vec![[0; 2]; self.num_words()];
-        let (base, index_mask, side) = (self.index(laser_cell) as i32, self.index_mask(), self.side());
-        // A quarter turn maps (dx, dy) to (−dy, dx); on the helix a column counts 1 and a row counts `side`.
-        let quarter_turns = [(1, side), (side, -1), (-1, -side), (-side, 1)];
+        let (base, index_mask) = (self.index(laser_cell) as i32, self.index_mask());
         let first_sector = (first_edge / SECTOR_WIDTH) as usize;
         for sector in
             (first_sector..first_sector + self.laser.num_sectors()).map(|sector| sector % NUM_SECTORS)
         {
-            let (quadrant, sector_of_quadrant) =
-                (sector / SECTORS_PER_QUADRANT, sector % SECTORS_PER_QUADRANT);
-            let (per_dx, per_dy) = quarter_turns[quadrant];
-            let bit_of = |cell: &ViewCell| {
-                base.wrapping_add(i32::from(cell.dx) * per_dx + i32::from(cell.dy) * per_dy) as usize
-                    & index_mask
-            };
             let from_edge = (sector as u32).wrapping_mul(SECTOR_WIDTH).wrapping_sub(first_edge);
             let beams =
                 (self.laser.beam_at(from_edge), self.laser.beam_at(from_edge.wrapping_add(SECTOR_WIDTH - 1)));
             let (free_for_all, reach) = common_limits(&self.laser.limits, beams);
-            let (free_cells, others) = self.view.split_sector(sector_of_quadrant, free_for_all);
-            let mut free = |cell: &ViewCell| {
-                let bit = bit_of(cell);
+            let num_free = self.view.num_nearer(sector, free_for_all);
+            let (cells, offsets, sign) = self.view.sector(sector);
+            let bit_of = |offset: i32| base.wrapping_add(offset * sign) as usize & index_mask;
+            let mut free = |offset: i32| {
+                let bit = bit_of(offset);
                 seen[bit >> 6][FREE] |= 1 << (bit & 63);
             };
             // The near half beside the far one: neighbours share words, and each write would wait for the last.
-            let (near, far) = free_cells.split_at(free_cells.len() / 2);
-            near.iter().zip(far).for_each(|(near, far)| {
+            let (near, far) = offsets[..num_free].split_at(num_free / 2);
+            near.iter().zip(far).for_each(|(&near, &far)| {
                 free(near);
                 free(far);
             });
-            far[near.len()..].iter().for_each(free);
-            for cell in others.iter().take_while(|cell| u32::from(cell.squared) < reach) {
-                let (bit, squared) = (bit_of(cell), u32::from(cell.squared));
-                let beam = self.laser.beam_at(from_edge.wrapping_add(cell.angle_in_sector));
+            far[near.len()..].iter().for_each(|&offset| free(offset));
+            let others = cells[num_free..].iter().zip(&offsets[num_free..]);
+            for (cell, &offset) in others.take_while(|(cell, _)| u32::from(cell.squared) < reach) {
+                let (bit, squared) = (bit_of(offset), u32::from(cell.squared));
+                let beam = self.laser.beam_at(from_edge.wrapping_add(cell.angle_in_sector()));
                 let limits = &self.laser.limits[beam];
                 // Without branches, as nothing foretells the outcome about a reading.
                 let is_free = squared < limits.free_end;
-                let is_hit = !is_free & (squared >= limits.hit_begin) & (squared < limits.hit_end);
-                seen[bit >> 6][usize::from(is_hit)] |= u64::from(is_free | is_hit) << (bit & 63);
+                let is_hit = squared.wrapping_sub(limits.hit_begin) < limits.hit_width;
+                let seen = &mut seen[bit >> 6];
+                seen[FREE] |= u64::from(is_free) << (bit & 63);
+                seen[HIT] |= u64::from(is_hit) << (bit & 63);
             }
         }
         seen

@@ -42,7 +42,7 @@ impl LocalMap {
         Self {
             config: config.clone(),
             laser: Laser::new(geometry),
-            view: FieldOfView::shared(radius),
+            view: FieldOfView::shared(radius, 1 << side_log2),
             robot: None,
             side_log2,
             words: vec![bit_planes::filled(config.initial); num_words],
@@ -91,11 +91,6 @@ impl LocalMap {
     /// Where a cell's bit stands on the helix.
     pub(super) fn index(&self, cell: Cell) -> usize {
         (cell.y.wrapping_shl(self.side_log2).wrapping_add(cell.x)) as usize & self.index_mask()
-    }
-
-    /// Columns to the next row on the helix.
-    pub(super) fn side(&self) -> i32 {
-        1 << self.side_log2
     }
 
     pub(super) fn index_mask(&self) -> usize {
