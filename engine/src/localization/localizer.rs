@@ -164,6 +164,8 @@ pub struct Localizer {
     state: LocalizationState,
 }
 
+/// How far beside a proposal its best pose may lie at first, metres and radians.
+const SEARCH_STEP: (f64, f64) = (0.2, 0.03);
 /// Tracks kept after a search, at most.
 const MAX_TRACKS: usize = 40;
 /// Tracks whose evidence lags this far behind the best are given up, natural logarithm.
@@ -204,11 +206,25 @@ impl Localizer {
         self.state = self.decide();
     }
 
-    /// Takes a pose that something else proposes, for the last keyframe.
+    /// Takes a pose that something else proposes for the robot as of the last scan.
     pub fn propose(&mut self, map: &ServedMap, map_from_robot: &Pose2) {
-        self.judge(map, map_from_robot);
+        let Some(moment) = self.moments.back() else { return };
+        let at_moment = map_from_robot.compose(&self.run_from_robot.between(&moment.run_from_robot));
+        let points = surroundings(
+            &self.moments,
+            self.config.surroundings_m,
+            self.config.search_range_m,
+            self.config.max_search_points,
+        );
+        let pose = climb(map, &points, &at_moment, SEARCH_STEP);
+        self.judge(map, &pose);
         self.prune();
         self.state = self.decide();
+    }
+
+    /// Metres driven since the session began.
+    pub const fn travel_m(&self) -> f64 {
+        self.travel_m
     }
 
     /// The answer as it stands.
@@ -314,7 +330,7 @@ impl Localizer {
             self.config.max_search_points,
         );
         for proposal in map.pyramid.search(&points, &self.config.search) {
-            let pose = climb(map, &points, &proposal.map_from_robot, (0.2, 0.03));
+            let pose = climb(map, &points, &proposal.map_from_robot, SEARCH_STEP);
             self.judge(map, &pose);
         }
         self.prune();

@@ -14,6 +14,7 @@ mod config;
 mod example;
 mod place_index;
 mod proposals;
+mod recent_scans;
 
 #[cfg(test)]
 mod tests;
@@ -22,3 +23,4 @@ pub use calibration::{Calibration, NUM_FEATURES, PlaceEvidence};
 pub use config::RecallConfig;
 pub use example::Example;
 pub use place_index::{FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive};
+pub use recent_scans::RecentScans;

@@ -167,7 +167,8 @@ impl App {
     }
 }
 
-fn invalid_geometry(error: locution_engine::config::ConfigError) -> AppError {
+/// A laser that the engine refuses, said of the field that the client sent.
+pub(super) fn invalid_geometry(error: locution_engine::config::ConfigError) -> AppError {
     AppError::invalid(error.field, error.problem)
 }
 

@@ -1,19 +1,24 @@
 //! "Where am I": sessions that are fed like runs and stored nowhere.
 //!
-//! A session looks for the robot in every component of the map version that served when it began, up to a few. Each
-//! component says how its best places compare with being off the map; that common yardstick makes their
-//! probabilities comparable.
+//! A session looks for the robot in every component of the map version that served when it began, up to a few. While
+//! the robot is not found, its last metres are also asked about like an example, and the places answered are judged with
+//! those of the search. Each component says how its best places compare with being off the map; that common yardstick
+//! makes their probabilities comparable.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
 use locution_engine::localization::{
     CellState, DensityFieldConfig, GridMap, LocalizationState, Localizer, ServedMap,
 };
+use locution_engine::recall::{Example, FoundPlace, PlaceIndex, RecentScans};
 use locution_engine::scan::{Scan, ScanGeometry};
+use locution_engine::translator::Translator;
 
+use super::examples::invalid_geometry;
 use super::maps::MapRecord;
 use super::site::Site;
 use super::{App, AppError, NewBatch, on_blocking_thread};
@@ -22,6 +27,8 @@ use super::{App, AppError, NewBatch, on_blocking_thread};
 const NUM_COMPONENTS_MAX: usize = 4;
 /// A session without scans for so long is forgotten.
 const IDLE_MAX: Duration = Duration::from_secs(900);
+/// A robot that is not found asks where its last metres were driven each time it has driven so far, metres.
+const RECALL_EVERY_M: f64 = 3.0;
 /// Odds of a place against "off the map" are cut here, so that they stay numbers.
 const ODDS_MAX: f64 = 1e6;
 
@@ -79,17 +86,43 @@ struct Session {
 #[derive(Clone)]
 pub(super) struct Search {
     parts: Vec<(u32, Arc<ServedMap>, Localizer)>,
+    memory: Memory,
     next_sequence: u64,
     latest_odom: Option<Pose2>,
 }
 
 impl Search {
     fn push(&mut self, scans: &[Scan]) {
-        for (_, map, localizer) in &mut self.parts {
-            scans.iter().for_each(|scan| localizer.push(map, scan));
+        for scan in scans {
+            self.parts.iter_mut().for_each(|(_, map, localizer)| localizer.push(map, scan));
+            self.memory.recent.push(scan);
+        }
+        if self.is_recall_due() {
+            self.recall();
         }
         self.next_sequence += scans.len() as u64;
         self.latest_odom = scans.last().map(|scan| scan.odom_from_robot).or(self.latest_odom);
+    }
+
+    fn travel_m(&self) -> f64 {
+        self.parts.first().map_or(0.0, |(_, _, localizer)| localizer.travel_m())
+    }
+
+    fn is_recall_due(&self) -> bool {
+        let is_found =
+            self.parts.iter().any(|(_, _, localizer)| localizer.state() == LocalizationState::Converged);
+        !is_found && self.travel_m() >= self.memory.recalled_at_m + RECALL_EVERY_M
+    }
+
+    /// Asks where the last metres were driven, and proposes the answers.
+    fn recall(&mut self) {
+        self.memory.recalled_at_m = self.travel_m();
+        for found in self.memory.places() {
+            let part = self.parts.iter_mut().find(|(component, ..)| *component == found.component);
+            if let Some((_, map, localizer)) = part {
+                localizer.propose(map, &found.map_from_robot);
+            }
+        }
     }
 
     fn estimate(&self) -> (LocalizationState, f64, Vec<LocatedHypothesis>) {
@@ -132,16 +165,40 @@ impl Search {
     }
 }
 
+/// What a session asks about, and whom.
+#[derive(Clone)]
+struct Memory {
+    config: Arc<EngineConfig>,
+    geometry: ScanGeometry,
+    index: Arc<PlaceIndex>,
+    recent: RecentScans,
+    /// Metres driven when it last asked.
+    recalled_at_m: f64,
+}
+
+impl Memory {
+    /// Where the last metres may have been driven.
+    fn places(&mut self) -> Vec<FoundPlace> {
+        let (config, geometry) = (&self.config, &self.geometry);
+        let read = Example::read(&config.translator, geometry, self.recent.scans(), &config.recall);
+        // The session's geometry passed the translator's check when it was opened; nothing to look for is no answer.
+        let example = read.ok().flatten();
+        example.map(|example| self.index.find(&example, &config.recall)).unwrap_or_default()
+    }
+}
+
 impl App {
     /// Opens a session in the serving map.
     ///
     /// # Errors
-    /// [`AppError::NotReady`] before the first build, [`AppError::Busy`] when there are too many sessions.
+    /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
+    /// [`AppError::Busy`] when there are too many sessions.
     pub async fn open_localisation(
         &self,
         site: &Site,
         geometry: ScanGeometry,
     ) -> Result<LocalisationInfo, AppError> {
+        Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
         let search = self.new_search(site, &map, &geometry).await?;
         let session = Session {
@@ -246,7 +303,14 @@ impl App {
                 Localizer::new(geometry.clone(), config.localization.localizer.clone()),
             ));
         }
-        Ok(Search { parts, next_sequence: 0, latest_odom: None })
+        let memory = Memory {
+            recent: RecentScans::new(config.recall.length_max_m),
+            geometry: geometry.clone(),
+            index: self.place_index(site, map).await?,
+            config,
+            recalled_at_m: 0.0,
+        };
+        Ok(Search { parts, memory, next_sequence: 0, latest_odom: None })
     }
 
     /// A component with the fields that localisation looks things up in.

@@ -16,7 +16,7 @@ use crate::state::AppState;
 #[utoipa::path(post, path = "/v1/sites/{site}/localisations", operation_id = "open_localisation",
     tag = "localisation", params(("site" = String, Path)), request_body = NewLocalisationDto,
     responses((status = 201, body = LocalisationDto), (status = 404, body = Problem), (status = 409, body = Problem),
-        (status = 429, body = Problem)))]
+        (status = 422, body = Problem), (status = 429, body = Problem)))]
 pub async fn open_localisation(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
