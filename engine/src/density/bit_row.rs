@@ -74,24 +74,18 @@ impl<const W: usize> BitRow<W> {
 
     /// Calls `act(start, end)` for every run of cells `start..end`.
     pub fn for_each_run(&self, mut act: impl FnMut(usize, usize)) {
-        let mut open = None;
+        let (mut open, mut last_bit) = (None, 0);
         for (word, &bits) in self.0.iter().enumerate() {
-            let base = word * 64;
-            let mut at = 0;
-            while at < 64 {
-                // With a run open, look for the first cell that is not there; otherwise for the first that is.
-                let rest = if open.is_some() { !bits } else { bits } >> at;
-                if rest == 0 {
-                    break;
+            // Set where a run begins and behind where one ends.
+            let mut changes = bits ^ (bits << 1 | last_bit);
+            last_bit = bits >> 63;
+            while changes != 0 {
+                let at = word * 64 + changes.trailing_zeros() as usize;
+                changes &= changes - 1;
+                match open.take() {
+                    Some(start) => act(start, at),
+                    None => open = Some(at),
                 }
-                at += rest.trailing_zeros() as usize;
-                open = match open {
-                    Some(start) => {
-                        act(start, base + at);
-                        None
-                    }
-                    None => Some(base + at),
-                };
             }
         }
         if let Some(start) = open {

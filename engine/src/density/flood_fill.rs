@@ -56,8 +56,8 @@ pub(super) fn with_neighbors<const W: usize>(reached: &[BitRow<W>], index: usize
 /// A closed ring of border cells is connected only across corners, hence the eight-neighbourhood. Runs of cells are
 /// united with the runs they touch in the row before.
 pub(super) fn count_groups<const W: usize>(rows: impl Iterator<Item = BitRow<W>>, min_cells: f64) -> usize {
-    let mut groups = Groups::default();
-    let (mut previous, mut current): (Vec<Run>, Vec<Run>) = (Vec::new(), Vec::new());
+    let mut groups = Groups::with_capacity(USUAL_NUM_RUNS);
+    let (mut previous, mut current): (Vec<Run>, Vec<Run>) = (Vec::with_capacity(8), Vec::with_capacity(8));
     for row in rows {
         current.clear();
         let mut touching = 0;
@@ -85,14 +85,20 @@ struct Run {
     group: usize,
 }
 
+/// Room for as many runs as a border of a kernel of some metres has, so that it need not grow.
+const USUAL_NUM_RUNS: usize = 256;
+
 /// Disjoint sets with the number of cells in each.
-#[derive(Default)]
 struct Groups {
     parents: Vec<usize>,
     num_cells: Vec<usize>,
 }
 
 impl Groups {
+    fn with_capacity(num_groups: usize) -> Self {
+        Self { parents: Vec::with_capacity(num_groups), num_cells: Vec::with_capacity(num_groups) }
+    }
+
     fn add(&mut self, num_cells: usize) -> usize {
         self.parents.push(self.parents.len());
         self.num_cells.push(num_cells);
