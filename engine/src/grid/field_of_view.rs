@@ -92,7 +92,7 @@ impl FieldOfView {
             .into_iter()
             .map(|(dx, dy)| ViewCell {
                 squared: squared(dx, dy) as u16,
-                angle: (direction(dx, dy) % SECTOR_WIDTH >> ANGLE_SHIFT) as u16,
+                angle: ((direction(dx, dy) % SECTOR_WIDTH) >> ANGLE_SHIFT) as u16,
             })
             .collect();
         let num_distances = reach as usize + 1;
