@@ -1,7 +1,7 @@
 //! A localisation session over one map: scans in, "where am I" out (SPEC section 6).
 //!
-//! Poses are proposed — by a search of the recent surroundings over the whole map, or from outside by words and
-//! profiles — and every proposal is judged by the same evidence: how all the scans of the last metres agree with the
+//! Poses are proposed — by a search of the recent surroundings over the whole map, or from outside by profiles of what
+//! was driven — and every proposal is judged by the same evidence: how all the scans of the last metres agree with the
 //! map when the robot is followed from there. The right place explains every scan; a place that merely looks alike
 //! sooner or later does not. A place off the map competes with a fixed agreement of its own, so that "lost" can win.
 

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use locution_client::{Client, LocalisationState, NewRun, Scan};
@@ -26,21 +26,8 @@ pub(super) const MAPPED_M: f64 = 2.0;
 /// The first truth belongs to the map's recording, the second to the other.
 #[derive(Debug, Args)]
 pub struct LocalizationArguments {
-    /// CARMEN log of which the map is made.
-    #[arg(long)]
-    map_from: PathBuf,
-    /// CARMEN log in which robots are switched on; may be the same file when parts are given.
-    #[arg(long)]
-    log: PathBuf,
-    /// True poses of --map-from, then of --log, in one frame.
-    #[arg(long, required = true, num_args = 1..)]
-    truth: Vec<PathBuf>,
-    /// Part of --map-from that is used, from and to as shares of its scans.
-    #[arg(long, value_delimiter = ',', default_value = "0,1")]
-    map_part: Vec<f64>,
-    /// Part of --log that is used.
-    #[arg(long, value_delimiter = ',', default_value = "0,1")]
-    part: Vec<f64>,
+    #[command(flatten)]
+    recordings: MapAndLog,
     /// Number of robots switched on.
     #[arg(long, default_value_t = 100)]
     trials: usize,
@@ -53,6 +40,36 @@ pub struct LocalizationArguments {
     /// Write the report here.
     #[arg(long)]
     json: Option<PathBuf>,
+}
+
+/// The recording of a map and the one that is looked for in it.
+#[derive(Debug, Args)]
+pub(super) struct MapAndLog {
+    /// CARMEN log of which the map is made.
+    #[arg(long)]
+    map_from: PathBuf,
+    /// CARMEN log that is looked for in it; may be the same file when parts are given.
+    #[arg(long)]
+    log: PathBuf,
+    /// True poses of --map-from, then of --log, in one frame.
+    #[arg(long, required = true, num_args = 1..)]
+    truth: Vec<PathBuf>,
+    /// Part of --map-from that is used, from and to as shares of its scans.
+    #[arg(long, value_delimiter = ',', default_value = "0,1")]
+    map_part: Vec<f64>,
+    /// Part of --log that is used.
+    #[arg(long, value_delimiter = ',', default_value = "0,1")]
+    part: Vec<f64>,
+}
+
+impl MapAndLog {
+    /// Reads both with their truths.
+    pub fn read(&self) -> Result<(Known, Known)> {
+        let [map_truth, log_truth] = self.truth.as_slice() else {
+            bail!("give two files to --truth: of --map-from, then of --log");
+        };
+        Ok((known(&self.map_from, map_truth, &self.map_part)?, known(&self.log, log_truth, &self.part)?))
+    }
 }
 
 /// A recording with a true pose for each scan that has one.
@@ -73,9 +90,7 @@ struct Report {
 }
 
 pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
-    ensure!(arguments.truth.len() == 2, "give --truth twice: of --map-from, then of --log");
-    let map = known(&arguments.map_from, &arguments.truth[0], &arguments.map_part)?;
-    let log = known(&arguments.log, &arguments.truth[1], &arguments.part)?;
+    let (map, log) = arguments.recordings.read()?;
     let began = std::time::Instant::now();
     let server = LocalServer::start().await?;
     let mapped = build(&server, &map, None).await?;
@@ -109,8 +124,8 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
 }
 
 /// Reads a part of a recording with its truth.
-pub(super) fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
-    let &[from, to] = part else { anyhow::bail!("a part is two shares, such as 0,0.5") };
+fn known(log: &Path, truth: &Path, part: &[f64]) -> Result<Known> {
+    let &[from, to] = part else { bail!("a part is two shares, such as 0,0.5") };
     ensure!((0.0..=1.0).contains(&from) && from < to && to <= 1.0, "a part is two rising shares of 0 to 1");
     let mut recording = read_recording(log, CarmenOptions::default())?;
     let odometry: Vec<OdometryPose> = recording

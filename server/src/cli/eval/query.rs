@@ -12,28 +12,15 @@ use locution_engine::geometry::Pose2;
 use serde::Serialize;
 
 use super::local_server::{LocalServer, SITE};
-use super::localization::{Known, MAPPED_M, build, expected_pose, known, travel};
+use super::localization::{Known, MAPPED_M, MapAndLog, build, expected_pose, travel};
 use crate::cli::output::write_json;
 use crate::cli::recordings::{read_recording, wire_geometry, wire_scan};
 
 /// The first truth belongs to the map's recording, the second to the other.
 #[derive(Debug, Args)]
 pub struct QueryArguments {
-    /// CARMEN log of which the map is made.
-    #[arg(long)]
-    map_from: PathBuf,
-    /// CARMEN log whose pieces are asked about; may be the same file when parts are given.
-    #[arg(long)]
-    log: PathBuf,
-    /// True poses of --map-from, then of --log, in one frame.
-    #[arg(long, required = true, num_args = 1..)]
-    truth: Vec<PathBuf>,
-    /// Part of --map-from that is used, from and to as shares of its scans.
-    #[arg(long, value_delimiter = ',', default_value = "0,1")]
-    map_part: Vec<f64>,
-    /// Part of --log that is used.
-    #[arg(long, value_delimiter = ',', default_value = "0,1")]
-    part: Vec<f64>,
+    #[command(flatten)]
+    recordings: MapAndLog,
     /// CARMEN logs of other buildings: none of their pieces is here.
     #[arg(long, num_args = 1..)]
     elsewhere: Vec<PathBuf>,
@@ -62,10 +49,8 @@ struct Report {
 }
 
 pub(super) async fn run(arguments: &QueryArguments) -> Result<()> {
-    ensure!(arguments.truth.len() == 2, "give --truth twice: of --map-from, then of --log");
     ensure!(arguments.length > 0.0 && arguments.pieces > 0, "--length and --pieces must be above zero");
-    let map = known(&arguments.map_from, &arguments.truth[0], &arguments.map_part)?;
-    let log = known(&arguments.log, &arguments.truth[1], &arguments.part)?;
+    let (map, log) = arguments.recordings.read()?;
     let began = Instant::now();
     let server = LocalServer::start().await?;
     let config = arguments.config.as_ref().map(|path| -> Result<serde_json::Value> {

@@ -145,13 +145,13 @@ fn near_an_end(corridor: &Corridor, place: &Point2) -> bool {
 mod tests {
     use super::*;
 
+    fn corridor(letter: char, points: &[(f64, f64)]) -> Corridor {
+        let points = points.iter().map(|&(x, y)| Point2::new(x, y)).collect();
+        Corridor { letter, points, width_m: 2.0 }
+    }
+
     #[test]
     fn routes_follow_their_letters() {
-        let corridor = |letter, points: &[(f64, f64)]| Corridor {
-            letter,
-            points: points.iter().map(|&(x, y)| Point2::new(x, y)).collect(),
-            width_m: 2.0,
-        };
         let graph = CorridorGraph {
             corridors: vec![
                 corridor('A', &[(0.0, 0.0), (10.0, 0.0)]),
@@ -166,11 +166,6 @@ mod tests {
 
     #[test]
     fn places_are_what_meets_in_them() {
-        let corridor = |letter, points: &[(f64, f64)]| Corridor {
-            letter,
-            points: points.iter().map(|&(x, y)| Point2::new(x, y)).collect(),
-            width_m: 2.0,
-        };
         let graph = CorridorGraph {
             corridors: vec![
                 corridor('A', &[(0.0, 0.0), (10.0, 0.0), (20.0, 0.0)]),
