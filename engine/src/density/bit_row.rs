@@ -9,6 +9,7 @@ impl<const W: usize> BitRow<W> {
     pub const EMPTY: Self = Self([0; W]);
 
     /// The cells `first..=last`.
+    #[inline(always)]
     pub fn range(first: usize, last: usize) -> Self {
         let upto = |end: usize, word: usize| match end.saturating_sub(word * 64) {
             0 => 0,
@@ -18,31 +19,38 @@ impl<const W: usize> BitRow<W> {
         Self(std::array::from_fn(|word| upto(last + 1, word) & !upto(first, word)))
     }
 
+    #[inline(always)]
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(|&word| word == 0)
     }
 
+    #[inline(always)]
     pub fn insert(&mut self, cell: usize) {
         self.0[cell >> 6] |= 1 << (cell & 63);
     }
 
+    #[inline(always)]
     pub fn and(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|word| self.0[word] & other.0[word]))
     }
 
+    #[inline(always)]
     pub fn and_not(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|word| self.0[word] & !other.0[word]))
     }
 
+    #[inline(always)]
     pub fn or(&self, other: &Self) -> Self {
         Self(std::array::from_fn(|word| self.0[word] | other.0[word]))
     }
 
+    #[inline(always)]
     pub fn count(&self) -> u32 {
         self.0.iter().map(|word| word.count_ones()).sum()
     }
 
     /// Every cell together with its left and right neighbour.
+    #[inline(always)]
     pub fn widened(&self) -> Self {
         Self(std::array::from_fn(|word| {
             let from_below = if word > 0 { self.0[word - 1] >> 63 } else { 0 };
@@ -52,12 +60,14 @@ impl<const W: usize> BitRow<W> {
     }
 
     /// The cells of `mask` that hang together, along the row, with a cell of `self`, itself within `mask`.
+    #[inline(always)]
     pub fn spread_within(&self, mask: &Self) -> Self {
         let up = self.spread_up(mask);
         up.or(&self.mirrored().spread_up(&mask.mirrored()).mirrored())
     }
 
     /// Adding seeds to their mask carries to the end of each run: what the sum flips is reached.
+    #[inline(always)]
     fn spread_up(&self, mask: &Self) -> Self {
         let mut carry = false;
         Self(std::array::from_fn(|word| {
@@ -68,24 +78,37 @@ impl<const W: usize> BitRow<W> {
         }))
     }
 
+    #[inline(always)]
     fn mirrored(&self) -> Self {
         Self(std::array::from_fn(|word| self.0[W - 1 - word].reverse_bits()))
     }
 
     /// Calls `act(start, end)` for every run of cells `start..end`.
+    #[inline(always)]
     pub fn for_each_run(&self, mut act: impl FnMut(usize, usize)) {
-        let (mut open, mut last_bit) = (None, 0);
+        let mut open = None;
         for (word, &bits) in self.0.iter().enumerate() {
-            // Set where a run begins and behind where one ends.
-            let mut changes = bits ^ (bits << 1 | last_bit);
-            last_bit = bits >> 63;
-            while changes != 0 {
-                let at = word * 64 + changes.trailing_zeros() as usize;
-                changes &= changes - 1;
-                match open.take() {
-                    Some(start) => act(start, at),
-                    None => open = Some(at),
+            // Cells still to be named; below them all is named or empty.
+            let mut left = bits;
+            if let Some(start) = open {
+                let len = (!left).trailing_zeros() as usize;
+                if len == 64 {
+                    continue;
                 }
+                act(start, word * 64 + len);
+                left &= u64::MAX << len;
+                open = None;
+            }
+            while left != 0 {
+                let start = word * 64 + left.trailing_zeros() as usize;
+                let filled = left | (left - 1);
+                let len = (!filled).trailing_zeros() as usize;
+                if len == 64 {
+                    open = Some(start);
+                    break;
+                }
+                act(start, word * 64 + len);
+                left &= u64::MAX << len;
             }
         }
         if let Some(start) = open {

@@ -1,8 +1,10 @@
 //! The density estimate around a cell, for all kernels in one flood fill (thesis Algorithms 3.1 and 6.1).
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::bit_row::BitRow;
 use super::config::DensityConfig;
-use super::flood_fill::{count_groups, flood_fill, with_neighbors};
+use super::flood_fill::{Row, count_groups, flood_fill, has_group, rows_with_neighbors};
 use super::kernel::Kernel;
 use crate::grid::{Cell, OccupancyRows};
 
@@ -50,90 +52,73 @@ impl DensityEstimator {
 
     /// Densities, hard flag and frontiers around `center`, which counts as free: the robot was there.
     pub fn estimate(&self, grid: &impl OccupancyRows, center: Cell) -> FreeSpaceDensity {
-        match (2 * self.reach + 1).div_ceil(64) {
-            0 | 1 => self.estimate_rows::<1>(grid, center),
-            2 => self.estimate_rows::<2>(grid, center),
-            3 => self.estimate_rows::<3>(grid, center),
-            4 => self.estimate_rows::<4>(grid, center),
-            _ => self.estimate_rows::<9>(grid, center),
-        }
+        // Compiled for several processors; the results are the same.
+        Arch::new().dispatch(Estimate { estimator: self, grid, center })
     }
 
+    #[inline(always)]
     fn estimate_rows<const W: usize>(&self, grid: &impl OccupancyRows, center: Cell) -> FreeSpaceDensity {
-        let mut window = Window::<W>::read(grid, center, self.reach);
-        window.free[self.reach].insert(self.reach);
+        let mut rows = self.read_rows::<W>(grid, center);
+        let middle = &mut rows[self.reach];
+        middle.free.insert(self.reach);
+        middle.reached.insert(self.reach);
         // What counts as free is no opening into the unknown.
-        window.unknown[self.reach] =
-            window.unknown[self.reach].and_not(&BitRow::range(self.reach, self.reach));
-        let mut reached = vec![BitRow::EMPTY; window.free.len()];
-        reached[self.reach].insert(self.reach);
+        middle.unknown = middle.unknown.and_not(&middle.reached);
         let mut answer =
             FreeSpaceDensity { soft: vec![0.0; self.kernels.len()], is_hard: true, num_frontiers: 0 };
         for &index in &self.by_bandwidth {
+            let kernel = &self.kernels[index];
+            for (dy, &half) in kernel.half_widths.iter().enumerate() {
+                let support = BitRow::range(self.reach - half as usize, self.reach + half as usize);
+                rows[self.reach + dy].support = support;
+                rows[self.reach - dy].support = support;
+            }
             // What a narrower kernel reached is reached by a wider one too, so the fill goes on from there.
-            let support = self.support::<W>(&self.kernels[index]);
-            let allowed: Vec<_> =
-                window.free.iter().zip(&support).map(|(free, support)| free.and(support)).collect();
-            flood_fill(&mut reached, &allowed);
-            answer.soft[index] = self.kernels[index].density(&reached, self.reach);
+            flood_fill(&mut rows);
+            answer.soft[index] = kernel.density(&rows, self.reach);
             if index == 0 {
-                answer.is_hard = !self.has_opening(&window, &reached, &support);
-                answer.num_frontiers = self.num_frontiers(&window, &reached, &support);
+                // Algorithm 3.1, lines 11 and 12, with the tolerance of SPEC 3.2.
+                let met = rows_with_neighbors(&rows, |row| row.unknown.and(&row.support));
+                answer.is_hard = !has_group(met, self.min_opening_cells);
+                // Algorithm 6.1.
+                let border = rows_with_neighbors(&rows, |row| row.free.and_not(&row.support));
+                answer.num_frontiers = count_groups(border, self.min_frontier_cells).min(255) as u8;
             }
         }
         answer
     }
 
-    fn support<const W: usize>(&self, kernel: &Kernel) -> Vec<BitRow<W>> {
-        let mut rows = vec![BitRow::EMPTY; 2 * self.reach + 1];
-        for (dy, &half) in kernel.half_widths.iter().enumerate() {
-            let row = BitRow::range(self.reach - half as usize, self.reach + half as usize);
-            rows[self.reach + dy] = row;
-            rows[self.reach - dy] = row;
+    /// The square of cells around a centre.
+    #[inline(always)]
+    fn read_rows<const W: usize>(&self, grid: &impl OccupancyRows, center: Cell) -> Vec<Row<W>> {
+        let reach = self.reach as i32;
+        let mut rows = vec![Row::EMPTY; 2 * self.reach + 1];
+        for (row, dy) in rows.iter_mut().zip(-reach..) {
+            grid.read_row(center.offset(-reach, dy), &mut row.free.0, &mut row.unknown.0);
         }
         rows
     }
-
-    /// Algorithm 3.1, lines 11 and 12, with the tolerance of SPEC 3.2.
-    fn has_opening<const W: usize>(
-        &self,
-        window: &Window<W>,
-        reached: &[BitRow<W>],
-        support: &[BitRow<W>],
-    ) -> bool {
-        let met = (0..reached.len())
-            .map(|row| with_neighbors(reached, row).and(&window.unknown[row]).and(&support[row]));
-        let num_met: u32 = met.clone().map(|row| row.count()).sum();
-        f64::from(num_met) > self.min_opening_cells && count_groups(met, self.min_opening_cells) > 0
-    }
-
-    /// Algorithm 6.1.
-    fn num_frontiers<const W: usize>(
-        &self,
-        window: &Window<W>,
-        reached: &[BitRow<W>],
-        support: &[BitRow<W>],
-    ) -> u8 {
-        let border = (0..reached.len())
-            .map(|row| with_neighbors(reached, row).and(&window.free[row]).and_not(&support[row]));
-        count_groups(border, self.min_frontier_cells).min(255) as u8
-    }
 }
 
-/// The square of cells around a centre.
-struct Window<const W: usize> {
-    free: Vec<BitRow<W>>,
-    unknown: Vec<BitRow<W>>,
+/// An estimate to be made by code for the processor at hand.
+struct Estimate<'a, G> {
+    estimator: &'a DensityEstimator,
+    grid: &'a G,
+    center: Cell,
 }
 
-impl<const W: usize> Window<W> {
-    fn read(grid: &impl OccupancyRows, center: Cell, reach: usize) -> Self {
-        let num_rows = 2 * reach + 1;
-        let mut window = Self { free: vec![BitRow::EMPTY; num_rows], unknown: vec![BitRow::EMPTY; num_rows] };
-        for row in 0..num_rows {
-            let start = center.offset(-(reach as i32), row as i32 - reach as i32);
-            grid.read_row(start, &mut window.free[row].0, &mut window.unknown[row].0);
+impl<G: OccupancyRows> WithSimd for Estimate<'_, G> {
+    type Output = FreeSpaceDensity;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) -> FreeSpaceDensity {
+        let Self { estimator, grid, center } = self;
+        match (2 * estimator.reach + 1).div_ceil(64) {
+            0 | 1 => estimator.estimate_rows::<1>(grid, center),
+            2 => estimator.estimate_rows::<2>(grid, center),
+            3 => estimator.estimate_rows::<3>(grid, center),
+            4 => estimator.estimate_rows::<4>(grid, center),
+            _ => estimator.estimate_rows::<9>(grid, center),
         }
-        window
     }
 }

@@ -5,6 +5,7 @@
 
 use super::bit_row::BitRow;
 use super::config::{KernelConfig, KernelProfile};
+use super::flood_fill::Row;
 use crate::grid::in_cells;
 
 /// What the weights of a kernel add up to, but for rounding.
@@ -74,17 +75,19 @@ impl Kernel {
         std::f64::consts::TAU * self.bandwidth
     }
 
-    /// Weighted share of the support that the rows cover; row `center` holds the kernel's centre at bit `center`.
-    pub fn density<const W: usize>(&self, rows: &[BitRow<W>], center: usize) -> f32 {
+    /// Weighted share of the support that was reached; row `center` holds the kernel's centre at bit `center`.
+    #[inline(always)]
+    pub fn density<const W: usize>(&self, rows: &[Row<W>], center: usize) -> f32 {
         let covered: u64 = (0..self.half_widths.len())
             .map(|dy| {
-                let below = if dy > 0 { self.row_sum(&rows[center - dy], dy, center) } else { 0 };
-                self.row_sum(&rows[center + dy], dy, center) + below
+                let below = if dy > 0 { self.row_sum(&rows[center - dy].reached, dy, center) } else { 0 };
+                self.row_sum(&rows[center + dy].reached, dy, center) + below
             })
             .sum();
         (covered as f64 / self.total as f64) as f32
     }
 
+    #[inline(always)]
     fn row_sum<const W: usize>(&self, row: &BitRow<W>, dy: usize, center: usize) -> u64 {
         if let Some(weight) = self.uniform_weight {
             return u64::from(row.count()) * weight;

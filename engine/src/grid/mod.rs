@@ -8,8 +8,10 @@
 mod bit_planes;
 mod cell;
 mod config;
+mod disc;
 mod field_of_view;
 mod himm;
+mod laser;
 mod local_map;
 
 pub use cell::Cell;
