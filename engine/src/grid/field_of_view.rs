@@ -101,7 +101,7 @@ impl FieldOfView {
         }
         view.rings = rings.into();
         view.squared = kept.iter().map(|cell| cell.map_or(NOWHERE, |cell| squared(cell) as u32)).collect();
-        let angle_in_sector = |(dx, dy)| direction(dx, dy) % SECTOR_WIDTH >> ANGLE_SHIFT << ANGLE_SHIFT;
+        let angle_in_sector = |(dx, dy)| ((direction(dx, dy) % SECTOR_WIDTH) >> ANGLE_SHIFT) << ANGLE_SHIFT;
         view.angles = kept.iter().map(|cell| cell.map_or(0, angle_in_sector)).collect();
         // A quarter turn maps (dx, dy) to (−dy, dx).
         let turned =

@@ -128,7 +128,7 @@ impl LocalMap {
     /// Which cells are free, and which are not occupied, in the block that holds a word of the helix.
     #[inline(always)]
     fn below(&self, word: usize) -> (Bits, Bits) {
-        let planes = &self.blocks[word / BLOCK_WORDS & (self.blocks.len() - 1)];
+        let planes = &self.blocks[(word / BLOCK_WORDS) & (self.blocks.len() - 1)];
         let below = |limit| bit_planes::below(planes, limit);
         (below(self.config.free_below), below(self.config.occupied_above + 1))
     }
