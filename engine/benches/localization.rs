@@ -67,15 +67,18 @@ fn update_particles(criterion: &mut Criterion) {
         let num_kernels = bandwidths_m.len();
         let config = DensityFieldConfig { bandwidths_m, ..Default::default() };
         let served = ServedMap::build(map.clone(), &config, &LikelihoodFieldConfig::default());
-        let seen = observe(&map, &robot, &config);
+        let seen = observe(&map, &robot.compose(&step), &config);
         let sensor = DensityModel::new(&served.density, &seen, &DensityModelConfig::default());
         let spread = ParticleFilter::global(&served, ParticleFilterConfig::default(), 7);
         let gathered =
             ParticleFilter::around(&served, &[robot], (0.5, 0.2), ParticleFilterConfig::default(), 7);
         for (name, start) in [("spread", spread), ("gathered", gathered)] {
-            let mut filter = start.clone();
             group.bench_function(format!("densities, {num_kernels} kernels, {name}"), |bencher| {
-                bencher.iter(|| filter.update(&served, &step, &sensor));
+                bencher.iter_batched_ref(
+                    || start.clone(),
+                    |filter| filter.update(&served, &step, &sensor),
+                    criterion::BatchSize::LargeInput,
+                );
             });
         }
     }

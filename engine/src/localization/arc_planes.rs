@@ -75,7 +75,7 @@ impl<const W: usize> DiscShape<W> {
     }
 
     /// Which cells of the left arc around `arc` belong to a fill that is kept by entered arcs.
-    #[inline]
+    #[inline(always)]
     pub fn leaving(&self, reach: &[Row<W>], arc: usize) -> Row<W> {
         let mut leaving = [0; W];
         for (half, rows) in &self.by_chord {
@@ -86,7 +86,7 @@ impl<const W: usize> DiscShape<W> {
 
     /// For the cells of the right arc around `arc` whose inner neighbour lies deeper in the disc: whether that
     /// neighbour is reached, and whether it is free.
-    #[inline]
+    #[inline(always)]
     pub fn inner(&self, reach: &[Row<W>], free: &[Row<W>], arc: usize) -> (Row<W>, Row<W>) {
         let (mut is_reached, mut is_free) = ([0; W], [0; W]);
         for (by, lower, upper) in &self.by_growth {
@@ -100,17 +100,20 @@ impl<const W: usize> DiscShape<W> {
 
     /// Turns a fill given row by row into the arcs through which its cells entered, of which there are as many as
     /// rows, the last being the one around the fill's centre.
+    #[inline(always)]
     pub fn by_arcs(&self, rows: &[Row<W>], reach: &mut [Row<W>]) {
         let radius = self.half_chords.len() / 2;
-        for group in 0..W {
-            for columns in 0..W {
-                let mut square = [0u64; 64];
-                for (bits, row) in square.iter_mut().zip(group * 64..self.num_rows()) {
-                    // Bit b of the row is column b − radius; it entered half a chord earlier.
-                    *bits = window(&rows[row], (columns * 64 + self.half_chords[row]) as i64 - radius as i64);
+        for (group, (rows, half_chords)) in rows.chunks(64).zip(self.half_chords.chunks(64)).enumerate() {
+            let mut squares = [[0u64; 64]; W];
+            for (row, (bits, half)) in rows.iter().zip(half_chords).enumerate() {
+                // Bit b of the row is column b − radius; it entered half a chord earlier.
+                for (square, word) in squares.iter_mut().zip(moved_right(bits, radius - half)) {
+                    square[row] = word;
                 }
-                turn(&mut square);
-                for (arc, &bits) in reach.iter_mut().skip(columns * 64).zip(&square) {
+            }
+            for (square, reach) in squares.iter_mut().zip(reach.chunks_mut(64)) {
+                turn(square);
+                for (arc, &bits) in reach.iter_mut().zip(&*square) {
                     arc[group] = bits;
                 }
             }
@@ -118,12 +121,16 @@ impl<const W: usize> DiscShape<W> {
     }
 }
 
-/// 64 bits of a row from a bit on, which may lie before its first.
-fn window<const W: usize>(row: &Row<W>, first: i64) -> u64 {
-    let word_at = |word: i64| if (0..W as i64).contains(&word) { row[word as usize] } else { 0 };
-    let (word, shift) = (first.div_euclid(64), first.rem_euclid(64));
-    let low = word_at(word) >> shift;
-    if shift == 0 { low } else { low | word_at(word + 1) << (64 - shift) }
+/// Every cell of a row moved to higher bits.
+#[inline(always)]
+fn moved_right<const W: usize>(row: &Row<W>, by: usize) -> Row<W> {
+    let (words, bits) = (by / 64, by % 64);
+    std::array::from_fn(|word| {
+        let high = if word >= words { row[word - words] << bits } else { 0 };
+        // Two shifts, as none moves by a whole word.
+        let low = if word > words { row[word - words - 1] >> 1 >> (63 - bits) } else { 0 };
+        high | low
+    })
 }
 
 /// The arcs of all centres of a row.
@@ -144,6 +151,7 @@ pub(super) struct ArcPlanes<const W: usize> {
 impl<const W: usize> ArcPlanes<W> {
     /// Cuts the arcs of `num_arcs` centres, and one more, out of the planes; `corner` is the padded column of the
     /// first centre and the padded row of the disc's lowest row.
+    #[inline(always)]
     pub fn cut(&mut self, planes: &BitPlanes, shape: &DiscShape<W>, corner: (usize, usize), num_arcs: usize) {
         let half = |row: usize| shape.half_chords[row] as i64;
         let free = |row: usize, column: usize| planes.free_row::<1>(row, column)[0];
@@ -165,6 +173,7 @@ impl<const W: usize> ArcPlanes<W> {
 }
 
 /// Turns rows of bits, given 64 at a time by `word(row, column)`, into `num_columns` words of a bit per row.
+#[inline(always)]
 fn turn_rows<const W: usize>(
     into: &mut Vec<Row<W>>,
     num_rows: usize,
@@ -193,6 +202,7 @@ fn turn_rows<const W: usize>(
 }
 
 /// Transposes 64 × 64 bits in place, by swapping ever smaller blocks (Hacker's Delight, section 7-3).
+#[inline(always)]
 fn turn(square: &mut [u64; 64]) {
     swap_blocks::<32>(square, 0x0000_0000_ffff_ffff);
     swap_blocks::<16>(square, 0x0000_ffff_0000_ffff);
@@ -204,6 +214,7 @@ fn turn(square: &mut [u64; 64]) {
 
 /// Swaps the off-diagonal blocks of `SIDE` × `SIDE` bits; the sides are known to the compiler, so that it can take
 /// several rows at once.
+#[inline(always)]
 fn swap_blocks<const SIDE: usize>(square: &mut [u64; 64], mask: u64) {
     for pair in square.chunks_exact_mut(2 * SIDE) {
         let (low, high) = pair.split_at_mut(SIDE);

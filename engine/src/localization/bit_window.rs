@@ -10,41 +10,49 @@ use super::grid_map::{CellState, GridMap};
 pub(super) type Row<const W: usize> = [u64; W];
 
 /// `a & b`.
+#[inline(always)]
 pub(super) fn and<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| a[word] & b[word])
 }
 
 /// `a | b`.
+#[inline(always)]
 pub(super) fn or<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| a[word] | b[word])
 }
 
 /// `a & !b`.
+#[inline(always)]
 pub(super) fn and_not<const W: usize>(a: &Row<W>, b: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| a[word] & !b[word])
 }
 
 /// True when no bit is set.
+#[inline(always)]
 pub(super) fn is_empty<const W: usize>(a: &Row<W>) -> bool {
     a.iter().fold(0, |all, word| all | word) == 0
 }
 
 /// Number of set bits.
+#[inline(always)]
 pub(super) fn count<const W: usize>(a: &Row<W>) -> u32 {
     a.iter().map(|word| word.count_ones()).sum()
 }
 
 /// The same, quicker where there are rarely any.
+#[inline(always)]
 pub(super) fn count_few<const W: usize>(a: &Row<W>) -> u32 {
     if is_empty(a) { 0 } else { count(a) }
 }
 
 /// True when a bit is set.
+#[inline(always)]
 pub(super) fn has<const W: usize>(a: &Row<W>, bit: usize) -> bool {
     a[bit / 64] >> (bit % 64) & 1 == 1
 }
 
 /// Positions of the set bits, ascending.
+#[inline(always)]
 pub(super) fn set_bits<const W: usize>(a: &Row<W>) -> impl Iterator<Item = usize> + use<W> {
     (*a).into_iter().enumerate().flat_map(|(word, mut bits)| {
         std::iter::from_fn(move || {
@@ -56,16 +64,19 @@ pub(super) fn set_bits<const W: usize>(a: &Row<W>) -> impl Iterator<Item = usize
 }
 
 /// Every cell moved one to the right (towards higher bits).
+#[inline(always)]
 pub(super) fn shifted_right<const W: usize>(a: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| (a[word] << 1) | if word > 0 { a[word - 1] >> 63 } else { 0 })
 }
 
 /// Every cell moved one to the left.
+#[inline(always)]
 pub(super) fn shifted_left<const W: usize>(a: &Row<W>) -> Row<W> {
     std::array::from_fn(|word| (a[word] >> 1) | if word + 1 < W { a[word + 1] << 63 } else { 0 })
 }
 
 /// The row whose bits `first..=last` are set; none when `last < first`.
+#[inline(always)]
 pub(super) fn span<const W: usize>(first: i64, last: i64) -> Row<W> {
     std::array::from_fn(|word| {
         let base = word as i64 * 64;
@@ -75,6 +86,7 @@ pub(super) fn span<const W: usize>(first: i64, last: i64) -> Row<W> {
 }
 
 /// All cells of `mask` that hang together with a cell of `seed` along the row; `seed` must lie within `mask`.
+#[inline(always)]
 pub(super) fn spread<const W: usize>(seed: &Row<W>, mask: &Row<W>) -> Row<W> {
     let mut reach = [0; W];
     let mut carry = false;
@@ -93,6 +105,7 @@ pub(super) fn spread<const W: usize>(seed: &Row<W>, mask: &Row<W>) -> Row<W> {
 }
 
 /// Spreads the bits of `seed` to lower bits along the runs of `mask`, by doubling (Kogge and Stone's prefix scheme).
+#[inline(always)]
 fn spread_left(seed: u64, mask: u64) -> u64 {
     let mut reach = seed;
     let mut passable = mask;
@@ -145,26 +158,30 @@ impl BitPlanes {
     }
 
     /// `64 W` free bits from a padded cell on to the right.
+    #[inline(always)]
     pub fn free_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
         self.row(&self.free, row, column)
     }
 
     /// The same for free cells with an unknown neighbour.
+    #[inline(always)]
     pub fn open_row<const W: usize>(&self, row: usize, column: usize) -> Row<W> {
         self.row(&self.open, row, column)
     }
 
     /// True when a padded cell is free.
-    #[inline]
+    #[inline(always)]
     pub fn is_free(&self, row: usize, column: usize) -> bool {
         self.free[row * self.words_per_row + column / 64] >> (column % 64) & 1 == 1
     }
 
     /// Eight free bits from a padded cell on to the right.
+    #[inline(always)]
     pub fn free_byte(&self, row: usize, column: usize) -> u64 {
         self.row::<1>(&self.free, row, column)[0] & 0xff
     }
 
+    #[inline(always)]
     fn row<const W: usize>(&self, plane: &[u64], row: usize, column: usize) -> Row<W> {
         let start = row * self.words_per_row + column / 64;
         let (words, shift) = (&plane[start..=start + W], column % 64);

@@ -15,6 +15,8 @@
 //! The fill itself is kept as the arcs through which its cells entered: cell (x, row) is bit `row` of `reach[x − half
 //! chord of the row]`. So what enters is one word, and what leaves is gathered from one word per length of chord.
 
+use pulp::{Arch, Simd, WithSimd};
+
 use super::arc_planes::{ArcPlanes, DiscShape};
 use super::bit_window::{
     BitPlanes, Row, and, and_not, count, count_few, has, is_empty, or, set_bits, shifted_left, shifted_right,
@@ -48,6 +50,8 @@ pub(super) struct DiscSweep<'a, const W: usize> {
     reach: Vec<Row<W>>,
     /// The fill of the last flood afresh, row by row.
     rows: Vec<Row<W>>,
+    /// The free cells that it could reach.
+    masks: Vec<Row<W>>,
     /// First row of the disc and first column of the arcs, counted in padded cells.
     bottom: usize,
     left: usize,
@@ -71,6 +75,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
             planes,
             kernel,
             rows: vec![[0; W]; shape.num_rows()],
+            masks: vec![[0; W]; shape.num_rows()],
             shape,
             arcs: ArcPlanes::default(),
             reach: Vec::new(),
@@ -87,6 +92,11 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
 
     /// Fills of the centres of a row from `column` on; None where the centre is not free.
     pub fn sweep(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
+        Arch::new().dispatch(RowOfCentres { disc: self, column, row, fills });
+    }
+
+    #[inline(always)]
+    fn fill_row(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
         let radius = self.kernel.radius();
         let can_slide = self.kernel.is_uniform() && radius > 2;
         self.bottom = self.planes.padded(row) - radius;
@@ -109,6 +119,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     }
 
     /// Moves the disc to the centre `arc` from the one on its left; false when the fill might fall apart.
+    #[inline(always)]
     fn slide_to(&mut self, arc: usize) -> bool {
         let leaving = self.shape.leaving(&self.reach, arc - 1);
         if !self.is_safe(&leaving, arc - 1) {
@@ -121,6 +132,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     }
 
     /// True when the fill stays in one piece as the reached cells `leaving` leave the disc around `arc`.
+    #[inline(always)]
     fn is_safe(&self, leaving: &Row<W>, arc: usize) -> bool {
         let beside = and(&self.arcs.leaving_free[arc + 1], leaving);
         let links = &self.shape.links;
@@ -196,6 +208,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     }
 
     /// Takes the right arc of the disc around `arc` into the fill, and whatever hangs on it.
+    #[inline(always)]
     fn enter(&mut self, arc: usize) {
         let free = self.arcs.entering_free[arc];
         let (reached_inside, free_inside) = self.shape.inner(&self.reach, &self.arcs.entering_free, arc);
@@ -271,27 +284,28 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
     }
 
     /// Floods the disc around `arc` from nothing; `keeps` says whether the disc may slide on.
+    #[inline(always)]
     fn flood(&mut self, arc: usize, keeps: bool) {
         let radius = self.kernel.radius();
         let left = self.left + arc - radius;
-        let disc = |row: usize, bits: Row<W>| and(&bits, &self.shape.disc[row]);
-        let masks: Vec<Row<W>> = (0..self.shape.num_rows())
-            .map(|row| disc(row, self.planes.free_row(self.bottom + row, left)))
-            .collect();
+        for (row, (mask, disc)) in self.masks.iter_mut().zip(&self.shape.disc).enumerate() {
+            *mask = and(disc, &self.planes.free_row(self.bottom + row, left));
+        }
         self.rows.fill([0; W]);
         self.rows[radius] = span(radius as i64, radius as i64);
-        settle(&mut self.rows, &masks, radius);
-        self.num_reached = self.rows.iter().map(count).sum();
-        let open = |(row, reached): (usize, &Row<W>)| {
-            count(&and(reached, &self.planes.open_row(self.bottom + row, left)))
-        };
-        self.num_open = self.rows.iter().enumerate().map(open).sum();
+        settle(&mut self.rows, &self.masks, radius);
+        (self.num_reached, self.num_open) = (0, 0);
+        for (row, reached) in self.rows.iter().enumerate() {
+            self.num_reached += count(reached);
+            self.num_open += count_few(&and(reached, &self.planes.open_row(self.bottom + row, left)));
+        }
         if keeps {
             self.shape.by_arcs(&self.rows, &mut self.reach[arc - 2 * radius..=arc]);
         }
     }
 
     /// What the fill around `arc` comes to; `by_arcs` says whether it is kept by arcs.
+    #[inline(always)]
     fn read(&mut self, arc: usize, by_arcs: bool) -> Fill {
         let has_opening = self.num_open > self.most_open && self.has_opening(arc, by_arcs);
         let density = self
@@ -326,31 +340,59 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         self.openings.has_larger_than(self.most_open)
     }
 
+    #[inline(always)]
     fn is_free(&self, row: usize, column: usize) -> bool {
         self.planes.is_free(self.bottom + row, column)
     }
 }
 
-/// Floods `reach` within `masks`, by alternating passes until one changes nothing; starts at the `middle` row.
+/// The fills of a row of centres, compiled for the words and counts of bits that the processor at hand has.
+struct RowOfCentres<'a, 'b, const W: usize> {
+    disc: &'a mut DiscSweep<'b, W>,
+    column: i64,
+    row: i64,
+    fills: &'a mut [Option<Fill>],
+}
+
+impl<const W: usize> WithSimd for RowOfCentres<'_, '_, W> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        self.disc.fill_row(self.column, self.row, self.fills);
+    }
+}
+
+/// Floods `reach` within `masks`, from the `middle` row up, then all the way down and up again until a way changes
+/// nothing.
+#[inline(always)]
 fn settle<const W: usize>(reach: &mut [Row<W>], masks: &[Row<W>], middle: usize) {
-    let num_rows = reach.len();
     reach[middle] = spread(&reach[middle], &masks[middle]);
-    let mut passes = 0;
+    let mut has_changed = false;
+    let mut before = reach[middle];
+    for (row, mask) in reach[middle + 1..].iter_mut().zip(&masks[middle + 1..]) {
+        before = grow(&before, row, mask, &mut has_changed);
+    }
     loop {
-        let mut has_changed = false;
-        let mut before = [0; W];
-        for step in 0..num_rows {
-            let row = if passes % 2 == 0 { step } else { num_rows - 1 - step };
-            before = grow(&before, &mut reach[row], &masks[row], &mut has_changed);
+        has_changed = false;
+        for (row, mask) in reach.iter_mut().zip(masks).rev() {
+            before = grow(&before, row, mask, &mut has_changed);
         }
-        passes += 1;
-        if !has_changed && passes > 1 {
+        if !has_changed {
+            return;
+        }
+        has_changed = false;
+        for (row, mask) in reach.iter_mut().zip(masks) {
+            before = grow(&before, row, mask, &mut has_changed);
+        }
+        if !has_changed {
             return;
         }
     }
 }
 
 /// Adds to a row what the row `before` leads to; returns the row.
+#[inline(always)]
 fn grow<const W: usize>(
     before: &Row<W>,
     reach: &mut Row<W>,
@@ -363,140 +405,4 @@ fn grow<const W: usize>(
         *has_changed = true;
     }
     *reach
-}
-
-#[cfg(test)]
-mod tests {
-    use std::collections::{HashSet, VecDeque};
-
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    use super::*;
-    use crate::density::KernelProfile;
-    use crate::geometry::Point2;
-    use crate::localization::arc_planes::margin;
-    use crate::localization::grid_map::{CellState, GridMap};
-    use crate::localization::kernel_rows::height;
-
-    /// Algorithm 3.1, cell by cell, with the tolerance of SPEC section 3.
-    fn literal_fill(
-        map: &GridMap,
-        centre: (i64, i64),
-        (profile, h): (KernelProfile, f64),
-        most_open: u32,
-    ) -> Option<Fill> {
-        if map.state(centre.0, centre.1) != CellState::Free {
-            return None;
-        }
-        let (mut mass, mut whole) = (0.0, 0.0);
-        let reach = h.ceil() as i64;
-        for (dx, dy) in (-reach..=reach).flat_map(|dx| (-reach..=reach).map(move |dy| (dx, dy))) {
-            let d = (dx as f64).hypot(dy as f64);
-            whole += if d < h { height(profile, d, h) } else { 0.0 };
-        }
-        let mut open = HashSet::new();
-        let mut seen = HashSet::from([centre]);
-        let mut queue = VecDeque::from([centre]);
-        while let Some((x, y)) = queue.pop_front() {
-            let d = ((x - centre.0) as f64).hypot((y - centre.1) as f64);
-            if d >= h {
-                continue;
-            }
-            if map.state(x, y) != CellState::Free {
-                continue;
-            }
-            mass += height(profile, d, h);
-            let around = [(x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)];
-            if around.iter().any(|&(x, y)| map.state(x, y) == CellState::Unknown) {
-                open.insert((x, y));
-            }
-            queue.extend(around.iter().filter(|&&cell| seen.insert(cell)));
-        }
-        let mut largest = 0;
-        while let Some(&first) = open.iter().next() {
-            open.remove(&first);
-            let mut group = vec![first];
-            let mut num_cells = 0;
-            while let Some((x, y)) = group.pop() {
-                num_cells += 1;
-                for beside in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy))) {
-                    group.extend(open.remove(&beside).then_some(beside));
-                }
-            }
-            largest = largest.max(num_cells);
-        }
-        Some(Fill { density: (mass / whole) as f32, has_opening: largest > most_open })
-    }
-
-    /// Rooms with doors and clutter, and a part nobody has seen.
-    fn random_building(rng: &mut ChaCha8Rng, width: usize, height: usize) -> GridMap {
-        let mut map = GridMap::unknown(width, height, 0.1, Point2::default());
-        for (column, row) in (0..width as i64).flat_map(|x| (0..height as i64).map(move |y| (x, y))) {
-            map.set(column, row, CellState::Free);
-        }
-        for _ in 0..8 {
-            let (at, is_row) = (rng.random_range(0..width.min(height) as i64), rng.random::<bool>());
-            for along in 0..width.max(height) as i64 {
-                if rng.random_range(0..12) > 0 {
-                    let (column, row) = if is_row { (along, at) } else { (at, along) };
-                    map.set(column, row, CellState::Occupied);
-                }
-            }
-        }
-        for _ in 0..width * height / 12 {
-            let state = if rng.random::<bool>() { CellState::Occupied } else { CellState::Unknown };
-            map.set(rng.random_range(0..width as i64), rng.random_range(0..height as i64), state);
-        }
-        map
-    }
-
-    fn sweep_all(
-        map: &GridMap,
-        planes: &BitPlanes,
-        kernel: &KernelRows,
-        most_open: u32,
-    ) -> Vec<Option<Fill>> {
-        let mut fills = vec![None; map.width() * map.height()];
-        for (row, fills) in fills.chunks_exact_mut(map.width()).enumerate() {
-            if kernel.radius() < 32 {
-                DiscSweep::<1>::new(planes, kernel, most_open).sweep(0, row as i64, fills);
-            } else {
-                DiscSweep::<2>::new(planes, kernel, most_open).sweep(0, row as i64, fills);
-            }
-        }
-        fills
-    }
-
-    #[test]
-    fn sliding_discs_agree_with_the_literal_flood() {
-        let mut rng = ChaCha8Rng::seed_from_u64(31);
-        let cases =
-            [(1.0, 20, 9), (3.0, 40, 33), (6.5, 37, 50), (15.0, 40, 33), (30.0, 50, 34), (57.0, 40, 30)];
-        for (h, width, height) in cases {
-            for profile in [KernelProfile::Uniform, KernelProfile::Gaussian, KernelProfile::Inverted] {
-                let map = random_building(&mut rng, width, height);
-                let kernel = KernelRows::new(profile, h);
-                let planes = BitPlanes::new(&map, margin(&kernel));
-                let most_open = rng.random_range(0..6);
-                let fills = sweep_all(&map, &planes, &kernel, most_open);
-                for (cell, fast) in fills.iter().enumerate() {
-                    let cell = ((cell % width) as i64, (cell / width) as i64);
-                    if h > 10.0 && rng.random_range(0..8) > 0 {
-                        continue;
-                    }
-                    match (fast, literal_fill(&map, cell, (profile, h), most_open)) {
-                        (Some(fast), Some(slow)) => {
-                            assert_eq!(fast.has_opening, slow.has_opening, "h {h} at {cell:?}");
-                            assert!(
-                                (fast.density - slow.density).abs() < 1e-5,
-                                "{fast:?} {slow:?} h {h} at {cell:?}"
-                            );
-                        }
-                        (fast, slow) => assert_eq!(*fast, slow, "h {h} at {cell:?}"),
-                    }
-                }
-            }
-        }
-    }
 }

@@ -8,6 +8,8 @@
 //!   tiles: one u32 per 64 cells ──► codes: [kernel 0: density, direction][kernel 1: …]… of 64 cells
 //! ```
 
+use std::f64::consts::TAU;
+
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -17,6 +19,7 @@ use super::connected_disc::{DiscSweep, Fill};
 use super::density_gradient::{GradientConfig, stable_descent};
 use super::grid_map::{CellState, GridMap};
 use super::kernel_rows::KernelRows;
+use super::turns::floor_to_u32;
 use crate::config::ConfigError;
 use crate::density::KernelProfile;
 use crate::geometry::{Point2, Pose2, wrap_angle};
@@ -33,7 +36,7 @@ pub(super) const STABLE: u8 = 0x80;
 pub const MAX_KERNELS: usize = 4;
 
 /// Code of a cell that is not free.
-const EMPTY: u16 = u16::from_le_bytes([NOT_FREE, 0]);
+pub(super) const EMPTY: u16 = u16::from_le_bytes([NOT_FREE, 0]);
 
 const TILE_SIDE: usize = 8;
 /// The first tile is empty and stands for all squares without a free cell.
@@ -202,14 +205,14 @@ impl DensityField {
     }
 
     /// First code of a cell, by its square and its place there.
-    #[inline]
+    #[inline(always)]
     fn start(&self, square: usize, place: usize) -> usize {
         (self.tiles[square] as usize * TILE_SIDE * TILE_SIDE + place) * self.stride
     }
 
     /// Where the codes of the cells at some positions begin, in metres from the lower left corner; outside the map
     /// that is an empty cell. Without branches, as particles are anywhere.
-    #[inline]
+    #[inline(always)]
     pub(super) fn starts<const L: usize>(&self, x_m: &[f32; L], y_m: &[f32; L]) -> [usize; L] {
         const SIDE: u32 = TILE_SIDE as u32;
         let scale = (1.0 / self.resolution_m) as f32;
@@ -220,7 +223,7 @@ impl DensityField {
         for (((square, place), x_m), y_m) in squares.iter_mut().zip(&mut places).zip(x_m).zip(y_m) {
             let (x, y) = (x_m * scale, y_m * scale);
             let is_inside = (x >= 0.0) & (y >= 0.0) & (x < width) & (y < height);
-            let (column, row) = (x as i32 as u32, y as i32 as u32);
+            let (column, row) = (floor_to_u32(x), floor_to_u32(y));
             let (across, up) = (column / SIDE, row / SIDE);
             *square = if is_inside { up.wrapping_mul(tiles_per_row).wrapping_add(across) } else { outside };
             *place = row % SIDE * SIDE + column % SIDE;
@@ -229,7 +232,7 @@ impl DensityField {
     }
 
     /// The codes of a cell, from where they begin.
-    #[inline]
+    #[inline(always)]
     pub(super) fn codes_from<const STRIDE: usize>(&self, start: usize) -> [u16; STRIDE] {
         let codes = &self.codes[start..start + STRIDE];
         std::array::from_fn(|kernel| codes[kernel])
@@ -246,9 +249,11 @@ const fn place_in_tile(column: usize, row: usize) -> usize {
     row % TILE_SIDE * TILE_SIDE + column % TILE_SIDE
 }
 
-fn encode(reading: &KernelReading) -> u16 {
-    let density = reading.density.map_or(UNDEFINED, |density| (density * FULL).round() as u8);
-    let direction = reading.descent_rad.map_or(0, |angle| STABLE | direction_code(angle));
+/// The code of a density and of the direction in which it falls, in turns; NaN stands for none.
+#[inline]
+fn encode(density: f32, descent_turns: f32) -> u16 {
+    let density = if density.is_nan() { UNDEFINED } else { floor_to_u32(density * FULL + 0.5) as u8 };
+    let direction = if descent_turns.is_nan() { 0 } else { STABLE | direction_code(descent_turns) };
     u16::from_le_bytes([density, direction])
 }
 
@@ -257,24 +262,22 @@ fn decode(code: u16) -> Option<KernelReading> {
     let turns = f64::from(direction & !STABLE) / 128.0;
     (density != NOT_FREE).then(|| KernelReading {
         density: (density != UNDEFINED).then(|| f32::from(density) / FULL),
-        descent_rad: (direction & STABLE != 0).then(|| wrap_angle(turns * std::f64::consts::TAU) as f32),
+        descent_rad: (direction & STABLE != 0).then(|| wrap_angle(turns * TAU) as f32),
     })
 }
 
-/// A direction in 1/128 turns.
-pub(super) fn direction_code(angle_rad: f32) -> u8 {
-    let turns = f64::from(angle_rad) / std::f64::consts::TAU;
-    ((turns * 128.0).round() as i64).rem_euclid(128) as u8
+/// A direction within [−½, ½] turns in 1/128 turns.
+#[inline]
+pub(super) fn direction_code(turns: f32) -> u8 {
+    floor_to_u32(turns * 128.0 + 128.5) as u8 & !STABLE
 }
 
 /// Codes of every cell for one kernel.
 fn kernel_codes(map: &GridMap, config: &DensityFieldConfig, bandwidth_m: f64) -> Vec<u16> {
     let densities = hard_densities(map, config, bandwidth_m / map.resolution_m());
     let descents = stable_descent(&densities, map.width(), &config.gradient);
-    let code = |(&density, descent_rad): (&f32, Option<f32>)| {
-        encode(&KernelReading { density: density.is_finite().then_some(density), descent_rad })
-    };
-    densities.iter().zip(descents).map(code).collect()
+    let code = |(&density, descent_turns): (&f32, f32)| encode(density, descent_turns);
+    densities.par_iter().zip(descents).map(code).collect()
 }
 
 /// Hard density of every cell for one kernel, NaN where it is undefined or the cell is not free.
@@ -329,7 +332,7 @@ fn sweep_by<const W: usize>(
 impl DensityFieldConfig {
     /// Open cells that may hang together while the density of a kernel is still hard.
     fn most_open(&self, bandwidth_cells: f64) -> u32 {
-        (self.unknown_tolerance * std::f64::consts::TAU * bandwidth_cells) as u32
+        (self.unknown_tolerance * TAU * bandwidth_cells) as u32
     }
 }
 
@@ -348,7 +351,7 @@ pub fn observe(
     config: &DensityFieldConfig,
 ) -> Vec<KernelReading> {
     let (column, row) = local_map.cell_at(&local_from_robot.position());
-    let to_robot = |angle: f32| wrap_angle(f64::from(angle) - local_from_robot.theta) as f32;
+    let to_robot = |turns: f32| wrap_angle(f64::from(turns) * TAU - local_from_robot.theta) as f32;
     let is_inside = local_map.state(column, row) == CellState::Free;
     config
         .bandwidths_m
@@ -360,11 +363,11 @@ pub fn observe(
             let bandwidth_cells = bandwidth_m / local_map.resolution_m();
             let densities = densities_around(local_map, config, bandwidth_cells, (column, row));
             let centre = densities.len() / 2;
-            let descent_rad = stable_descent(&densities, AROUND, &config.gradient)[centre];
+            let descent_turns = stable_descent(&densities, AROUND, &config.gradient)[centre];
             let density = densities[centre];
             KernelReading {
                 density: density.is_finite().then_some(density),
-                descent_rad: descent_rad.map(to_robot),
+                descent_rad: descent_turns.is_finite().then(|| to_robot(descent_turns)),
             }
         })
         .collect()

@@ -1,10 +1,10 @@
 //! The direction in which a density field falls, where it can be trusted (thesis section 3.3.1).
 
-use std::f32::consts::TAU;
-
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::turns::direction_in_turns;
 use crate::config::ConfigError;
 
 /// Where a gradient is stable.
@@ -42,30 +42,62 @@ impl GradientConfig {
     }
 }
 
-/// Direction of steepest descent per cell, radians in (−π, π], where it is stable.
+/// Direction of steepest descent per cell, in [−½, ½] turns, NaN where it is not stable.
 ///
 /// `densities` are rows of `width` cells, NaN where there is no density. The Sobel operator needs the eight
 /// neighbours, and stability the gradients of those, so a direction exists only where 5 × 5 cells have a density.
-pub(super) fn stable_descent(densities: &[f32], width: usize, config: &GradientConfig) -> Vec<Option<f32>> {
+pub(super) fn stable_descent(densities: &[f32], width: usize, config: &GradientConfig) -> Vec<f32> {
     let slopes = Slopes::of(densities, width);
+    let mut descents = vec![f32::NAN; densities.len()];
     let height = densities.len() / width;
-    let min_steepness = config.min_slope_per_cell as f32;
-    let min_cosine = config.max_turn_rad.cos() as f32;
-    let descent_at = |cell: usize| {
-        let steepness = slopes.steepness[cell];
-        if steepness <= min_steepness || steepness.is_nan() {
-            return None;
+    if width < 3 || height < 3 {
+        return descents;
+    }
+    let (min_steepness, min_cosine) = (config.min_slope_per_cell as f32, config.max_turn_rad.cos() as f32);
+    descents[width..(height - 1) * width].par_chunks_exact_mut(width).enumerate().for_each(
+        |(row_below, descents)| {
+            let row = DescentRow { slopes: &slopes, row_below, min_steepness, min_cosine, descents };
+            Arch::new().dispatch(row);
+        },
+    );
+    descents
+}
+
+/// The directions of one row.
+struct DescentRow<'a> {
+    slopes: &'a Slopes,
+    row_below: usize,
+    min_steepness: f32,
+    min_cosine: f32,
+    descents: &'a mut [f32],
+}
+
+impl WithSimd for DescentRow<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { slopes, row_below, min_steepness, min_cosine, descents } = self;
+        let (width, count) = (descents.len(), descents.len() - 2);
+        // The inner cells of the row, seen from one to the lower left of them.
+        let cells = |plane: &'_ [f32], up: usize, right: usize| (row_below + up) * width + right..plane.len();
+        let near = |plane, up, right| &plane[cells(plane, up, right)][..count];
+        let (x, y) = (near(&slopes.uphill_x, 1, 1), near(&slopes.uphill_y, 1, 1));
+        let descents = &mut descents[1..][..count];
+        let steepness = near(&slopes.steepness, 1, 1);
+        for (descent, ((x, y), steepness)) in descents.iter_mut().zip(x.iter().zip(y).zip(steepness)) {
+            *descent = if *steepness > min_steepness { direction_in_turns(-x, -y) } else { f32::NAN };
         }
-        let (column, row) = (cell % width, cell / width);
-        let is_inner = column > 0 && row > 0 && column + 1 < width && row + 1 < height;
-        let (x, y) = (slopes.uphill_x[cell], slopes.uphill_y[cell]);
-        let is_stable = is_inner
-            && neighbours(cell, width)
-                .iter()
-                .all(|&other| x * slopes.uphill_x[other] + y * slopes.uphill_y[other] >= min_cosine);
-        is_stable.then(|| descent(x, y))
-    };
-    (0..densities.len()).into_par_iter().map(descent_at).collect()
+        for (up, right) in [(0, 0), (0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1), (2, 2)] {
+            let others = near(&slopes.uphill_x, up, right).iter().zip(near(&slopes.uphill_y, up, right));
+            for (descent, ((x, y), (other_x, other_y))) in
+                descents.iter_mut().zip(x.iter().zip(y).zip(others))
+            {
+                // A gradient that does not exist agrees with none.
+                *descent = if x * other_x + y * other_y >= min_cosine { *descent } else { f32::NAN };
+            }
+        }
+    }
 }
 
 /// Gradients of all cells: their directions as unit vectors and their lengths per cell; NaN where a neighbour has no
@@ -116,19 +148,11 @@ fn sobel_row([below, own, above]: [&[f32]; 3], x: &mut [f32], y: &mut [f32], ste
     }
 }
 
-/// The eight neighbours of an inner cell, lower row first, left to right.
-const fn neighbours(cell: usize, width: usize) -> [usize; 8] {
-    let (below, above) = (cell - width, cell + width);
-    [below - 1, below, below + 1, cell - 1, cell + 1, above - 1, above, above + 1]
-}
-
-fn descent(gx: f32, gy: f32) -> f32 {
-    let angle = (-gy).atan2(-gx);
-    if angle <= -TAU / 2.0 { angle + TAU } else { angle }
-}
-
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
     use super::*;
 
     fn field(width: usize, height: usize, density: impl Fn(f32, f32) -> f32) -> Vec<f32> {
@@ -139,22 +163,22 @@ mod tests {
     fn a_slope_falls_where_it_falls() {
         let descents =
             stable_descent(&field(7, 6, |x, y| 0.5 - 0.01 * x + 0.02 * y), 7, &GradientConfig::default());
-        let expected = (-0.02f32).atan2(0.01);
+        let expected = (-0.02f32).atan2(0.01) / std::f32::consts::TAU;
         for row in 2..4 {
             for column in 2..5 {
-                let found = descents[row * 7 + column].expect("the slope is even");
+                let found = descents[row * 7 + column];
                 assert!((found - expected).abs() < 1e-4, "{found} is not {expected}");
             }
         }
-        assert_eq!(descents[7 + 1], None, "the gradient of its neighbours at the edge is unknown");
+        assert!(descents[7 + 1].is_nan(), "the gradient of its neighbours at the edge is unknown");
     }
 
     #[test]
     fn a_summit_and_a_plain_have_no_direction() {
         let summit = field(9, 9, |x, y| 1.0 - 0.01 * (x - 4.0).hypot(y - 4.0));
-        assert_eq!(stable_descent(&summit, 9, &GradientConfig::default())[4 * 9 + 4], None);
+        assert!(stable_descent(&summit, 9, &GradientConfig::default())[4 * 9 + 4].is_nan());
         let plain = field(9, 9, |_, _| 0.7);
-        assert_eq!(stable_descent(&plain, 9, &GradientConfig::default())[4 * 9 + 4], None);
+        assert!(stable_descent(&plain, 9, &GradientConfig::default())[4 * 9 + 4].is_nan());
     }
 
     #[test]
@@ -162,7 +186,64 @@ mod tests {
         let mut slope = field(9, 9, |x, _| 0.1 * x);
         slope[2 * 9 + 4] = f32::NAN;
         let descents = stable_descent(&slope, 9, &GradientConfig::default());
-        assert_eq!(descents[4 * 9 + 4], None);
-        assert!(descents[5 * 9 + 4].is_some());
+        assert!(descents[4 * 9 + 4].is_nan());
+        assert!(descents[5 * 9 + 4].is_finite());
+    }
+
+    /// One cell after the other, as the thesis tells it.
+    fn descent_at(densities: &[f32], width: usize, cell: usize, config: &GradientConfig) -> Option<f32> {
+        let (column, row) = (cell % width, cell / width);
+        if !(2..width - 2).contains(&column) || !(2..densities.len() / width - 2).contains(&row) {
+            return None;
+        }
+        let gradient = |cell: usize| {
+            let at = |dx: usize, dy: usize| densities[cell + dx + dy * width - 1 - width];
+            let gx = (at(2, 2) + 2.0 * at(2, 1) + at(2, 0) - at(0, 2) - 2.0 * at(0, 1) - at(0, 0)) / 8.0;
+            let gy = (at(0, 2) + 2.0 * at(1, 2) + at(2, 2) - at(0, 0) - 2.0 * at(1, 0) - at(2, 0)) / 8.0;
+            (gx, gy)
+        };
+        let (gx, gy) = gradient(cell);
+        let turns_little = |other: usize| {
+            let (other_x, other_y) = gradient(other);
+            let cosine = (gx * other_x + gy * other_y) / (gx.hypot(gy) * other_x.hypot(other_y));
+            f64::from(cosine) >= config.max_turn_rad.cos()
+        };
+        let (below, above) = (cell - width, cell + width);
+        let around = [below - 1, below, below + 1, cell - 1, cell + 1, above - 1, above, above + 1];
+        let is_stable =
+            f64::from(gx.hypot(gy)) > config.min_slope_per_cell && around.into_iter().all(turns_little);
+        is_stable.then(|| (-gy).atan2(-gx) / std::f32::consts::TAU)
+    }
+
+    #[test]
+    fn rows_agree_with_one_cell_after_the_other() {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let config = GradientConfig { max_turn_rad: 0.8, ..GradientConfig::default() };
+        let (mut num_stable, mut num_unstable) = (0, 0);
+        for (width, height) in [(5, 5), (9, 31), (40, 23), (2, 9), (9, 2)] {
+            let (rise_x, rise_y) = (rng.random_range(-0.02..0.02), rng.random_range(-0.02..0.02));
+            let mut densities = field(width, height, |x, y| {
+                0.5 + rise_x * x + rise_y * y + 0.05 * (0.3 * x).sin() * (0.4 * y).cos()
+            });
+            for _ in 0..densities.len() / 100 {
+                let hole = rng.random_range(0..densities.len());
+                densities[hole] = f32::NAN;
+            }
+            let descents = stable_descent(&densities, width, &config);
+            for (cell, found) in descents.into_iter().enumerate().filter(|_| width > 4 && height > 4) {
+                match descent_at(&densities, width, cell, &config) {
+                    Some(expected) => {
+                        let off = (found - expected).rem_euclid(1.0);
+                        assert!(off < 1e-4 || off > 1.0 - 1e-4, "{found} is not {expected}");
+                        num_stable += 1;
+                    }
+                    None => {
+                        assert!(found.is_nan());
+                        num_unstable += 1;
+                    }
+                }
+            }
+        }
+        assert!(num_stable > 100 && num_unstable > 100, "{num_stable} and {num_unstable}");
     }
 }

@@ -3,13 +3,17 @@
 //! Every test that a particle fails halves its weight, so a weight is the number of failed tests; the tests compare
 //! bytes of the density field.
 
+use std::f64::consts::TAU;
+
+use pulp::{Arch, Simd, WithSimd};
 use serde::{Deserialize, Serialize};
 
 use super::density_field::{
-    DensityField, FULL, KernelReading, MAX_KERNELS, NOT_FREE, STABLE, UNDEFINED, direction_code,
+    DensityField, EMPTY, FULL, KernelReading, MAX_KERNELS, STABLE, UNDEFINED, direction_code,
 };
 use super::particle_filter::SensorModel;
 use super::particles::Particles;
+use super::turns::{floor_to_u32, wrap_turns};
 use crate::config::ConfigError;
 
 /// Tolerances of the density weights.
@@ -75,16 +79,17 @@ impl KernelTest {
             test.span = ((density + tolerance) * FULL).floor().min(FULL) as u8 - test.low;
         }
         if let Some(descent_rad) = reading.descent_rad {
-            let half = (config.direction_tolerance_rad / std::f64::consts::TAU * 128.0).floor() as u8;
+            let half = (config.direction_tolerance_rad / TAU * 128.0).floor() as u8;
             test.turn_span = (2 * half).min(127);
             // α_robot is heading − descent, and the robot's heading in its own frame is 0.
-            test.turn_offset = half.wrapping_add(direction_code(descent_rad)) & 127;
+            let descent_turns = (f64::from(descent_rad) / TAU) as f32;
+            test.turn_offset = half.wrapping_add(direction_code(wrap_turns(descent_turns))) & 127;
         }
         test
     }
 
     /// Failed tests of a particle of this heading (1/128 turns) on a cell of these codes.
-    #[inline]
+    #[inline(always)]
     fn num_failed(&self, density: u8, direction: u8, heading: u8) -> u8 {
         let is_off = (density.wrapping_sub(self.low) > self.span) & (density != UNDEFINED);
         let turn = heading.wrapping_sub(direction).wrapping_add(self.turn_offset) & 127;
@@ -98,14 +103,9 @@ impl KernelTest {
 pub struct DensityModel<'a> {
     field: &'a DensityField,
     tests: [KernelTest; MAX_KERNELS],
-    /// Weight by number of failed tests, and off the free space.
-    weights: [f32; OFF_THE_FLOOR + 1],
+    /// Weight of one, two, four and eight failed tests: the bits of their number.
+    penalties: [f32; 4],
 }
-
-/// Particles weighed side by side.
-const LANES: usize = 16;
-/// Place in the table of weights that no number of failed tests reaches.
-const OFF_THE_FLOOR: usize = 2 * MAX_KERNELS + 1;
 
 impl<'a> DensityModel<'a> {
     /// Weights for what the robot sees now, one reading per kernel of the field; missing readings pass everybody.
@@ -114,72 +114,87 @@ impl<'a> DensityModel<'a> {
         for (test, reading) in tests.iter_mut().zip(readings).take(field.num_kernels()) {
             *test = KernelTest::new(reading, config);
         }
-        let mut weights = std::array::from_fn(|failed| config.penalty.powi(failed as i32) as f32);
-        weights[OFF_THE_FLOOR] = 0.0;
-        Self { field, tests, weights }
+        let penalties = [1, 2, 4, 8].map(|num_failed| config.penalty.powi(num_failed) as f32);
+        Self { field, tests, penalties }
+    }
+}
+
+impl SensorModel for DensityModel<'_> {
+    fn weigh(&self, particles: &mut Particles) {
+        let arch = Arch::new();
+        match self.field.stride() {
+            1 => arch.dispatch(Weighing::<1>::new(self, particles)),
+            2 => arch.dispatch(Weighing::<2>::new(self, particles)),
+            _ => arch.dispatch(Weighing::<4>::new(self, particles)),
+        }
+    }
+}
+
+/// Particles weighed side by side.
+const LANES: usize = 64;
+
+/// The weighing of all particles with `STRIDE` kernels side by side, a loop for the widest vectors at hand.
+struct Weighing<'a, const STRIDE: usize> {
+    field: &'a DensityField,
+    tests: [KernelTest; STRIDE],
+    penalties: [f32; 4],
+    particles: &'a mut Particles,
+}
+
+impl<'a, const STRIDE: usize> Weighing<'a, STRIDE> {
+    fn new(model: &DensityModel<'a>, particles: &'a mut Particles) -> Self {
+        let tests = std::array::from_fn(|kernel| model.tests[kernel]);
+        Self { field: model.field, tests, penalties: model.penalties, particles }
     }
 
-    fn weigh_by<const STRIDE: usize>(&self, particles: &mut Particles) {
-        let tests: [KernelTest; STRIDE] = std::array::from_fn(|kernel| self.tests[kernel]);
-        let (x_blocks, x_rest) = particles.x_m.as_chunks::<LANES>();
-        let (y_blocks, y_rest) = particles.y_m.as_chunks::<LANES>();
-        let (heading_blocks, heading_rest) = particles.heading_turns.as_chunks::<LANES>();
-        let (weight_blocks, weight_rest) = particles.weight.as_chunks_mut::<LANES>();
+    /// Weighs some particles: first where their codes lie, then all codes, then all tests, so that no particle waits
+    /// for another's memory.
+    #[inline(always)]
+    fn weigh_block(&self, [x_m, y_m, heading_turns]: [&[f32; LANES]; 3], weight: &mut [f32; LANES]) {
+        let mut codes = [[0u16; STRIDE]; LANES];
+        for (codes, start) in codes.iter_mut().zip(self.field.starts(x_m, y_m)) {
+            *codes = self.field.codes_from(start);
+        }
+        let mut num_failed = [0u8; LANES];
+        for ((failed, codes), turns) in num_failed.iter_mut().zip(&codes).zip(heading_turns) {
+            let heading = floor_to_u32(turns * 128.0 + 128.5) as u8;
+            for (test, code) in self.tests.iter().zip(codes) {
+                let [density, direction] = code.to_le_bytes();
+                *failed += test.num_failed(density, direction, heading);
+            }
+        }
+        let [one, two, four, eight] = self.penalties;
+        for ((weight, codes), &failed) in weight.iter_mut().zip(&codes).zip(&num_failed) {
+            let for_bit = |bit: u8, penalty: f32| if failed & bit != 0 { penalty } else { 1.0 };
+            let penalty = for_bit(1, one) * for_bit(2, two) * (for_bit(4, four) * for_bit(8, eight));
+            // A robot stands on free cells only.
+            *weight = if codes[0] == EMPTY { 0.0 } else { *weight * penalty };
+        }
+    }
+}
+
+impl<const STRIDE: usize> WithSimd for Weighing<'_, STRIDE> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Particles { x_m, y_m, heading_turns, mut weight } = std::mem::take(self.particles);
+        let (x_blocks, x_rest) = x_m.as_chunks::<LANES>();
+        let (y_blocks, y_rest) = y_m.as_chunks::<LANES>();
+        let (heading_blocks, heading_rest) = heading_turns.as_chunks::<LANES>();
+        let (weight_blocks, weight_rest) = weight.as_chunks_mut::<LANES>();
         let blocks = x_blocks.iter().zip(y_blocks).zip(heading_blocks).zip(weight_blocks);
         for (((x, y), heading), weight) in blocks {
-            self.weigh_block(&tests, [x, y, heading], weight);
+            self.weigh_block([x, y, heading], weight);
         }
         let padded = |rest: &[f32]| {
             let mut block = [0.0; LANES];
             block[..rest.len()].copy_from_slice(rest);
             block
         };
-        let mut weight = padded(weight_rest);
-        self.weigh_block(&tests, [&padded(x_rest), &padded(y_rest), &padded(heading_rest)], &mut weight);
-        weight_rest.copy_from_slice(&weight[..weight_rest.len()]);
-    }
-
-    /// Weighs some particles side by side: first where their codes lie, then all codes, then all tests, so that no
-    /// particle waits for another's memory.
-    #[inline]
-    fn weigh_block<const STRIDE: usize>(
-        &self,
-        tests: &[KernelTest; STRIDE],
-        [x_m, y_m, heading_turns]: [&[f32; LANES]; 3],
-        weight: &mut [f32; LANES],
-    ) {
-        let starts = self.field.starts(x_m, y_m);
-        let mut densities = [[0u8; LANES]; STRIDE];
-        let mut directions = [[0u8; LANES]; STRIDE];
-        for (lane, &start) in starts.iter().enumerate() {
-            for (kernel, code) in self.field.codes_from::<STRIDE>(start).into_iter().enumerate() {
-                [densities[kernel][lane], directions[kernel][lane]] = code.to_le_bytes();
-            }
-        }
-        let headings = heading_turns.map(|turns| (turns * 128.0 + 128.5) as i32 as u8);
-        let mut num_failed = [0u8; LANES];
-        for ((test, densities), directions) in tests.iter().zip(&densities).zip(&directions) {
-            let codes = densities.iter().zip(directions);
-            for ((failed, (&density, &direction)), &heading) in
-                num_failed.iter_mut().zip(codes).zip(&headings)
-            {
-                *failed += test.num_failed(density, direction, heading);
-            }
-        }
-        // A robot stands on free cells only.
-        for ((weight, &density), &failed) in weight.iter_mut().zip(&densities[0]).zip(&num_failed) {
-            let is_free = density != NOT_FREE;
-            *weight *= self.weights[if is_free { usize::from(failed) } else { OFF_THE_FLOOR }];
-        }
-    }
-}
-
-impl SensorModel for DensityModel<'_> {
-    fn weigh(&self, particles: &mut Particles) {
-        match self.field.stride() {
-            1 => self.weigh_by::<1>(particles),
-            2 => self.weigh_by::<2>(particles),
-            _ => self.weigh_by::<4>(particles),
-        }
+        let mut last = padded(weight_rest);
+        self.weigh_block([&padded(x_rest), &padded(y_rest), &padded(heading_rest)], &mut last);
+        weight_rest.copy_from_slice(&last[..weight_rest.len()]);
+        *self.particles = Particles { x_m, y_m, heading_turns, weight };
     }
 }

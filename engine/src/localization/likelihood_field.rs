@@ -7,8 +7,6 @@
 use serde::{Deserialize, Serialize};
 
 use super::grid_map::{CellState, GridMap};
-use super::particle_filter::SensorModel;
-use super::particles::Particles;
 use crate::config::ConfigError;
 use crate::geometry::{Point2, Pose2};
 
@@ -54,6 +52,9 @@ impl LikelihoodFieldConfig {
     }
 }
 
+/// Cells per side of a square of codes.
+const SQUARE_SIDE: u32 = 8;
+
 /// Log-likelihoods of beam ends over a map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LikelihoodField {
@@ -62,8 +63,8 @@ pub struct LikelihoodField {
     height: usize,
     resolution_m: f64,
     origin: Point2,
-    /// Rows of codes start at multiples of 2^`row_shift`.
-    row_shift: u32,
+    /// Squares of cells, each a line of the cache, so that beams which end close together share memory.
+    squares_per_row: u32,
     codes: Vec<u8>,
     /// What one step of the code is worth, in natural logarithms.
     unit: f64,
@@ -81,24 +82,47 @@ impl LikelihoodField {
             ((config.log_likelihood(distance_m) - worst) / unit).round() as u8
         };
         let by_square: Vec<u8> = (0..=2 * (reach * reach) as u32).map(code).collect();
-        let row_shift = (map.width() + 2).next_power_of_two().trailing_zeros();
-        let mut codes = vec![0; (map.height() + 2) << row_shift];
-        for (row, squares) in squared_distances(map, reach).chunks_exact(map.width()).enumerate() {
-            let start = ((row + 1) << row_shift) + 1;
-            for (code, &square) in codes[start..].iter_mut().zip(squares) {
-                *code = by_square.get(square as usize).copied().unwrap_or(0);
-            }
-        }
-        Self {
+        let squares = |cells: usize| (cells + 2).div_ceil(SQUARE_SIDE as usize);
+        let squares_per_row = squares(map.width());
+        let mut field = Self {
             width: map.width(),
             height: map.height(),
             resolution_m: map.resolution_m(),
             origin: map.origin(),
-            row_shift,
-            codes,
+            squares_per_row: squares_per_row as u32,
+            codes: vec![0; squares_per_row * squares(map.height()) * (SQUARE_SIDE * SQUARE_SIDE) as usize],
             unit,
             independence: config.independence,
+        };
+        for (row, squares) in (1..).zip(squared_distances(map, reach).chunks_exact(map.width())) {
+            for (column, &square) in (1..).zip(squares) {
+                let place = field.place(column, row) as usize;
+                field.codes[place] = by_square.get(square as usize).copied().unwrap_or(0);
+            }
         }
+        field
+    }
+
+    /// Where the code of a cell lies; columns and rows count from the corner of the border.
+    #[inline(always)]
+    pub(super) fn place(&self, column: u32, row: u32) -> u32 {
+        let square =
+            (row / SQUARE_SIDE).wrapping_mul(self.squares_per_row).wrapping_add(column / SQUARE_SIDE);
+        square.wrapping_mul(SQUARE_SIDE * SQUARE_SIDE)
+            | row % SQUARE_SIDE * SQUARE_SIDE
+            | column % SQUARE_SIDE
+    }
+
+    /// The code at a place of a cell.
+    #[inline(always)]
+    pub(super) fn code(&self, place: u32) -> u8 {
+        self.codes[place as usize]
+    }
+
+    /// Column and row of the last cell, that of the border's far corner.
+    #[inline(always)]
+    pub(super) const fn last_cell(&self) -> (u32, u32) {
+        (self.width as u32 + 1, self.height as u32 + 1)
     }
 
     /// Code of the cell that holds a point: 0 far from obstacles or outside, 255 on one.
@@ -108,7 +132,7 @@ impl LikelihoodField {
         if column < 0.0 || row < 0.0 || column >= self.width as f64 || row >= self.height as f64 {
             return 0;
         }
-        self.codes[((row as usize + 1) << self.row_shift) + column as usize + 1]
+        self.code(self.place(column as u32 + 1, row as u32 + 1))
     }
 
     /// Natural logarithm that one step of the code is worth for one beam, with the beams' dependence taken off.
@@ -166,138 +190,6 @@ fn squared_distances(map: &GridMap, reach: usize) -> Vec<u32> {
     squares
 }
 
-/// A scan against a likelihood field: the sensor model of pose tracking.
-///
-/// The beam ends are turned once per heading that particles have, in steps of [`TURN_STEPS`], and kept in fixed point, so
-/// that a beam of a particle is two sums, a few shifts and one byte of memory.
-#[derive(Clone, Debug)]
-pub struct LikelihoodFieldModel<'a> {
-    field: &'a LikelihoodField,
-    /// Beam ends in the robot's frame, in cells.
-    ends: Vec<(f64, f64)>,
-    /// No end is farther from the robot than this, in cells.
-    reach: f32,
-}
-
-/// Headings told apart: 0.09° off at most, 1.5 cm at ten metres.
-const TURN_STEPS: usize = 2048;
-/// Fractions of a cell are kept to 2⁻¹².
-const FRACTION_BITS: u32 = 12;
-/// Positions and ends stay below this, so that their sums stay within fixed point.
-const FARTHEST_CELLS: f32 = 200_000.0;
-const ONE_CELL: f64 = (1 << FRACTION_BITS) as f64;
-
-/// Beam ends at every heading that occurs, in fixed point.
-struct TurnedEnds {
-    num_ends: usize,
-    /// Where the ends of a heading begin; `ABSENT` when no particle has it.
-    starts: Vec<u32>,
-    ends: Vec<(i32, i32)>,
-}
-
-const ABSENT: u32 = u32::MAX;
-
-impl TurnedEnds {
-    fn new(ends: &[(f64, f64)], headings: &[u16]) -> Self {
-        let mut turned = Self { num_ends: ends.len(), starts: vec![ABSENT; TURN_STEPS], ends: Vec::new() };
-        for &heading in headings {
-            let start = &mut turned.starts[usize::from(heading)];
-            if *start != ABSENT {
-                continue;
-            }
-            *start = turned.ends.len() as u32;
-            let (sin, cos) = (f64::from(heading) / TURN_STEPS as f64 * std::f64::consts::TAU).sin_cos();
-            turned.ends.extend(ends.iter().map(|(along, across)| {
-                (fixed(cos * along - sin * across), fixed(sin * along + cos * across))
-            }));
-        }
-        turned
-    }
-
-    #[inline]
-    fn at(&self, heading: u16) -> &[(i32, i32)] {
-        let start = self.starts[usize::from(heading)] as usize;
-        &self.ends[start..start + self.num_ends]
-    }
-}
-
-fn fixed(cells: f64) -> i32 {
-    (cells * ONE_CELL).round() as i32
-}
-
-/// The step of a heading in turns.
-fn heading_step(heading_turns: f32) -> u16 {
-    ((heading_turns * TURN_STEPS as f32).round() as i32).rem_euclid(TURN_STEPS as i32) as u16
-}
-
-impl<'a> LikelihoodFieldModel<'a> {
-    /// The model of the beam ends `points`, in the robot's frame, metres; ends farther than any map is wide say nothing.
-    pub fn new(field: &'a LikelihoodField, points: &[Point2]) -> Self {
-        let ends: Vec<(f64, f64)> = points
-            .iter()
-            .map(|point| (point.x / field.resolution_m, point.y / field.resolution_m))
-            .filter(|(along, across)| along.hypot(*across) < f64::from(FARTHEST_CELLS))
-            .collect();
-        let reach = ends.iter().map(|(along, across)| along.hypot(*across)).fold(0.0, f64::max);
-        Self { field, ends, reach: reach as f32 + 1.0 }
-    }
-
-    /// Sum of codes of all beam ends for a particle, its position in cells.
-    #[inline]
-    fn score(&self, x: f32, y: f32, ends: &[(i32, i32)]) -> u32 {
-        let field = self.field;
-        let (right, top) = (field.width as f32, field.height as f32);
-        // The codes begin with a border of one cell. What is so far off the map sees nothing of it.
-        let near = |cells: f32| fixed(f64::from(cells.clamp(-FARTHEST_CELLS, FARTHEST_CELLS)) + 1.0);
-        let (column, row) = (near(x), near(y));
-        let is_deep_inside =
-            x > self.reach && y > self.reach && x + self.reach < right && y + self.reach < top;
-        if is_deep_inside {
-            return ends.iter().map(|end| field.code_of(column + end.0, row + end.1)).sum();
-        }
-        // Beyond the edge all cells are worth nothing, as those of the border are.
-        let side = |cells: usize| ((cells + 1) << FRACTION_BITS) as i32;
-        let (right, top) = (side(field.width), side(field.height));
-        ends.iter()
-            .map(|end| field.code_of((column + end.0).clamp(0, right), (row + end.1).clamp(0, top)))
-            .sum()
-    }
-}
-
-impl LikelihoodField {
-    /// Code at a position in fixed point, counted from the corner of the border.
-    #[inline]
-    fn code_of(&self, column: i32, row: i32) -> u32 {
-        let cell = ((row >> FRACTION_BITS) << self.row_shift) | (column >> FRACTION_BITS);
-        u32::from(self.codes.get(cell as usize).copied().unwrap_or(0))
-    }
-}
-
-impl SensorModel for LikelihoodFieldModel<'_> {
-    fn weigh(&self, particles: &mut Particles) {
-        let scale = (1.0 / self.field.resolution_m) as f32;
-        let headings: Vec<u16> = particles.heading_turns.iter().map(|turns| heading_step(*turns)).collect();
-        let turned = TurnedEnds::new(&self.ends, &headings);
-        let poses = particles.x_m.iter().zip(&particles.y_m).zip(&headings);
-        let scores: Vec<u32> =
-            poses.map(|((x, y), heading)| self.score(x * scale, y * scale, turned.at(*heading))).collect();
-        let best = scores.iter().copied().max().unwrap_or(0);
-        let by_lag = self.weights_by_lag();
-        for (weight, score) in particles.weight.iter_mut().zip(scores) {
-            *weight *= by_lag.get((best - score) as usize).copied().unwrap_or(0.0);
-        }
-    }
-}
-
-impl LikelihoodFieldModel<'_> {
-    /// Weight by how far a score lags behind the best one, down to where it vanishes.
-    fn weights_by_lag(&self) -> Vec<f32> {
-        let unit = self.field.unit_of_evidence();
-        let num_lags = ((30.0 / unit).ceil() as usize).min(255 * self.ends.len() + 1);
-        (0..num_lags).map(|lag| (-unit * lag as f64).exp() as f32).collect()
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use rand::{RngExt, SeedableRng};
@@ -333,40 +225,5 @@ mod tests {
                 assert_eq!(square, exact.unwrap_or(u32::MAX), "{column},{row}");
             }
         }
-    }
-
-    #[test]
-    fn particles_are_weighed_as_one_point_after_another() {
-        let mut rng = ChaCha8Rng::seed_from_u64(6);
-        let map = scattered(&mut rng, 90, 70);
-        let field = LikelihoodField::build(&map, &LikelihoodFieldConfig::default());
-        let points: Vec<Point2> =
-            (0..19).map(|_| Point2::new(rng.random_range(-4.0..4.0), rng.random_range(-4.0..4.0))).collect();
-        let mut particles = Particles::default();
-        for _ in 0..300 {
-            let pose = Pose2::new(
-                rng.random_range(-4.0..7.0),
-                rng.random_range(1.0..10.0),
-                rng.random_range(-3.0..3.0),
-            );
-            particles.push(&pose, &map.origin());
-        }
-        let model = LikelihoodFieldModel::new(&field, &points);
-        let close = (0..300).filter(|&index| {
-            let exact = particles.pose(index, &map.origin());
-            let heading = heading_step(particles.heading_turns[index]);
-            let stepped = f64::from(heading) / TURN_STEPS as f64 * std::f64::consts::TAU;
-            assert!(crate::geometry::angle_between(exact.theta, stepped) < 0.0016, "half a step at most");
-            let pose = Pose2::new(exact.x, exact.y, stepped);
-            let slow = field.mean_code(&points, &pose) * points.len() as f64;
-            let (x, y) = (particles.x_m[index] * 10.0, particles.y_m[index] * 10.0);
-            let turned = TurnedEnds::new(&model.ends, &[heading]);
-            // A point within a rounding error of a cell's edge may fall on either side.
-            (f64::from(model.score(x, y, turned.at(heading))) - slow).abs() < 0.5
-        });
-        assert!(close.count() >= 290);
-        model.weigh(&mut particles);
-        let best = particles.weight.iter().copied().fold(0.0, f32::max);
-        assert_eq!(best, 1.0, "the best particle keeps its weight");
     }
 }

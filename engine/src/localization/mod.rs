@@ -27,6 +27,7 @@ mod grid_map;
 mod hypotheses;
 mod kernel_rows;
 mod likelihood_field;
+mod likelihood_model;
 mod localizer;
 mod motion_model;
 mod noise;
@@ -43,6 +44,8 @@ mod track;
 mod turns;
 
 #[cfg(test)]
+mod connected_disc_tests;
+#[cfg(test)]
 mod session_tests;
 #[cfg(test)]
 mod tests;
@@ -56,7 +59,8 @@ pub use filter_trial::{FilterSenses, FilterSensor, FilterTrial, Sensed};
 pub use global_search::{GlobalSearchConfig, ScoredPose, SearchPyramid};
 pub use grid_map::{CellState, GridMap};
 pub use hypotheses::{ClusterConfig, Hypothesis};
-pub use likelihood_field::{LikelihoodField, LikelihoodFieldConfig, LikelihoodFieldModel};
+pub use likelihood_field::{LikelihoodField, LikelihoodFieldConfig};
+pub use likelihood_model::LikelihoodFieldModel;
 pub use localizer::{LocalizationEstimate, LocalizationState, Localizer, LocalizerConfig};
 pub use motion_model::OdometryMotionModel;
 pub use particle_filter::{ParticleFilter, ParticleFilterConfig, RecoveryConfig, SensorModel};

@@ -3,9 +3,11 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use pulp::{Arch, Simd, WithSimd};
+use rand::Rng;
 use serde::{Deserialize, Serialize};
 
-use super::noise::{LANES, Lanes, NoiseLanes};
+use super::noise::Noise;
 use super::particles::Particles;
 use super::turns::{sin_cos_turns, wrap_turns};
 use crate::config::ConfigError;
@@ -63,29 +65,10 @@ impl OdometryMotionModel {
     }
 
     /// Moves every particle by the odometry step `previous_from_robot`, with noise of its own.
-    pub(super) fn predict(
-        &self,
-        particles: &mut Particles,
-        previous_from_robot: &Pose2,
-        noise: &mut NoiseLanes,
-    ) {
+    pub(super) fn predict(&self, particles: &mut Particles, previous_from_robot: &Pose2, rng: &mut impl Rng) {
         let step = self.step(previous_from_robot);
-        let Particles { x_m, y_m, heading_turns, .. } = particles;
-        let (x_blocks, x_rest) = x_m.as_chunks_mut::<LANES>();
-        let (y_blocks, y_rest) = y_m.as_chunks_mut::<LANES>();
-        let (heading_blocks, heading_rest) = heading_turns.as_chunks_mut::<LANES>();
-        for ((x, y), heading) in x_blocks.iter_mut().zip(y_blocks).zip(heading_blocks) {
-            step.apply(x, y, heading, noise);
-        }
-        let count = x_rest.len();
-        let (mut x, mut y, mut heading) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        x[..count].copy_from_slice(x_rest);
-        y[..count].copy_from_slice(y_rest);
-        heading[..count].copy_from_slice(heading_rest);
-        step.apply(&mut x, &mut y, &mut heading, noise);
-        x_rest.copy_from_slice(&x[..count]);
-        y_rest.copy_from_slice(&y[..count]);
-        heading_rest.copy_from_slice(&heading[..count]);
+        let noises = std::array::from_fn(|_| Noise::new(rng));
+        Arch::new().dispatch(Prediction { step, noises, particles });
     }
 
     /// Splits a step into turn, drive and turn; a robot that backs up turns little, not by half a circle.
@@ -114,18 +97,27 @@ impl OdometryMotionModel {
     }
 }
 
-impl Step {
-    #[inline]
-    fn apply(&self, x: &mut Lanes, y: &mut Lanes, heading: &mut Lanes, noise: &mut NoiseLanes) {
-        let (first, drive, second) = (noise.normals(), noise.normals(), noise.normals());
-        let noises = first.iter().zip(&drive).zip(&second);
-        for (((x, y), heading), ((first, drive), second)) in x.iter_mut().zip(y).zip(heading).zip(noises) {
-            let towards = wrap_turns(*heading + self.first_turn + self.first_turn_sd * first);
-            let drive_m = self.drive_m + self.drive_sd_m * drive;
+/// A step of all particles, a loop for the widest vectors at hand.
+struct Prediction<'a> {
+    step: Step,
+    noises: [Noise; 3],
+    particles: &'a mut Particles,
+}
+
+impl WithSimd for Prediction<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let Self { step, noises: [first, drive, second], particles } = self;
+        let Particles { x_m, y_m, heading_turns, .. } = particles;
+        for (index, ((x, y), heading)) in (0..).zip(x_m.iter_mut().zip(y_m).zip(heading_turns)) {
+            let towards = wrap_turns(*heading + step.first_turn + step.first_turn_sd * first.normal(index));
+            let drive_m = step.drive_m + step.drive_sd_m * drive.normal(index);
             let (sin, cos) = sin_cos_turns(towards);
             *x += drive_m * cos;
             *y += drive_m * sin;
-            *heading = wrap_turns(towards + self.second_turn + self.second_turn_sd * second);
+            *heading = wrap_turns(towards + step.second_turn + step.second_turn_sd * second.normal(index));
         }
     }
 }
@@ -142,7 +134,7 @@ mod tests {
         let origin = Point2::new(-20.0, 5.0);
         let mut particles = Particles::default();
         (0..count).for_each(|_| particles.push(start, &origin));
-        model.predict(&mut particles, step, &mut NoiseLanes::new(&mut ChaCha8Rng::seed_from_u64(1)));
+        model.predict(&mut particles, step, &mut ChaCha8Rng::seed_from_u64(1));
         (0..count).map(|index| particles.pose(index, &origin)).collect()
     }
 

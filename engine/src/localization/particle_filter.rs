@@ -8,9 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::hypotheses::{ClusterConfig, Hypothesis, cluster};
 use super::motion_model::OdometryMotionModel;
-use super::noise::NoiseLanes;
+use super::noise::Noise;
 use super::particles::Particles;
-use super::resampling::{draw_ancestors, inherit};
+use super::resampling::Resampling;
 use super::served_map::ServedMap;
 use crate::config::ConfigError;
 use crate::geometry::Pose2;
@@ -103,7 +103,7 @@ pub struct ParticleFilter {
     particles: Particles,
     /// The other set, so that resampling need not allocate.
     spare: Particles,
-    ancestors: Vec<u32>,
+    resampling: Resampling,
     /// Mean weight in the long and in the short run.
     mean_weights: Option<(f64, f64)>,
 }
@@ -128,10 +128,10 @@ impl ParticleFilter {
         seed: u64,
     ) -> Self {
         let mut filter = Self::empty(config, seed);
-        let mut noise = NoiseLanes::new(&mut filter.rng);
+        let noises: [Noise; 3] = std::array::from_fn(|_| Noise::new(&mut filter.rng));
         let count = if poses.is_empty() { 0 } else { filter.config.num_particles };
         for index in 0..count {
-            let normals = noise.normals().map(f64::from);
+            let normals = noises.map(|noise| f64::from(noise.normal(index as u32)));
             let pose = &poses[index * poses.len() / count];
             let off = Pose2::new(deviation_m * normals[0], deviation_m * normals[1], 0.0);
             let moved = Pose2::new(pose.x + off.x, pose.y + off.y, pose.theta + deviation_rad * normals[2]);
@@ -146,7 +146,7 @@ impl ParticleFilter {
             rng: ChaCha8Rng::seed_from_u64(seed),
             particles: Particles::default(),
             spare: Particles::default(),
-            ancestors: Vec::new(),
+            resampling: Resampling::default(),
             mean_weights: None,
         }
     }
@@ -163,8 +163,7 @@ impl ParticleFilter {
 
     /// Moves the particles without a measurement.
     pub fn predict(&mut self, previous_from_robot: &Pose2) {
-        let mut noise = NoiseLanes::new(&mut self.rng);
-        self.config.motion.predict(&mut self.particles, previous_from_robot, &mut noise);
+        self.config.motion.predict(&mut self.particles, previous_from_robot, &mut self.rng);
     }
 
     /// Where the robot may be, most probable first.
@@ -197,8 +196,7 @@ impl ParticleFilter {
         if keeps {
             return;
         }
-        if draw_ancestors(&self.particles.weight, count, start, &mut self.ancestors) {
-            inherit(&self.particles, &self.ancestors, &mut self.spare);
+        if self.resampling.draw_heirs(&self.particles, start, &mut self.spare) {
             std::mem::swap(&mut self.particles, &mut self.spare);
         } else {
             // Nobody stands where a robot can stand: the measurement says nothing about whom to keep.
@@ -219,13 +217,15 @@ impl ParticleFilter {
 fn sow(map: &ServedMap, count: usize, rng: &mut ChaCha8Rng) -> Vec<Pose2> {
     let cells = map.free_cells();
     let count = if cells.is_empty() { 0 } else { count };
-    let half = map.grid.resolution_m() / 2.0;
+    let side_m = map.grid.resolution_m();
+    let [along, across, up, turn]: [Noise; 4] = std::array::from_fn(|_| Noise::new(rng));
     (0..count)
         .map(|number| {
-            let place = (number as f64 + rng.random_range(0.0..1.0)) * cells.len() as f64 / count as f64;
+            let uniform = |noise: Noise| f64::from(noise.uniform(number as u32));
+            let place = (number as f64 + uniform(along)) * cells.len() as f64 / count as f64;
             let center = map.center_of(cells[(place as usize).min(cells.len() - 1)]);
-            let (dx, dy) = (rng.random_range(-half..half), rng.random_range(-half..half));
-            Pose2::new(center.x + dx, center.y + dy, rng.random_range(-TAU / 2.0..TAU / 2.0))
+            let (dx, dy) = ((uniform(across) - 0.5) * side_m, (uniform(up) - 0.5) * side_m);
+            Pose2::new(center.x + dx, center.y + dy, (uniform(turn) - 0.5) * TAU)
         })
         .collect()
 }
