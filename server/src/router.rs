@@ -7,7 +7,8 @@ use axum::Router;
 use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::middleware::{self, Next};
-use axum::response::{IntoResponse, Response};
+use axum::response::{IntoResponse, Redirect, Response};
+use axum::routing::get;
 use tokio::sync::Semaphore;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
@@ -84,6 +85,7 @@ pub fn build_router(state: AppState) -> Router {
         .method_not_allowed_fallback(async || ApiError::of_status(StatusCode::METHOD_NOT_ALLOWED))
         .layer(middleware::from_fn_with_state(state.clone(), guard))
         .with_state(state)
+        .route("/", get(async || Redirect::temporary("/ui")))
         .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::document()))
         .fallback(async || ApiError::not_found("there is no such path; see /docs"))
         .layer(DefaultBodyLimit::max(limits.body_bytes_max))

@@ -102,6 +102,7 @@ async fn operations_answer() {
     let server = TestServer::start().await;
     let api = &server.api;
     assert_eq!(api.get("/healthz").await.text(), "ok\n");
+    assert_eq!(api.get("/").await.text(), api.get("/ui").await.text(), "the bare address leads to the page");
     assert_eq!(api.get("/readyz").await.text(), "ready\n");
     api.get("/v1/sites").await.ok();
     assert!(api.get("/metrics").await.text().contains("locution_http_requests_total"));

@@ -8,10 +8,9 @@ use crate::config::ConfigError;
 
 /// How places are labelled from the map.
 ///
-/// The lengths of forks and bends, the two limits of corners and the smoothing were chosen on `aces`, `intel`,
-/// `mit-killian` and three simulated floors. The limits of corners sit on a narrow optimum: with 0.88 instead of 0.87 the
-/// precision of corners on `intel` falls from 87 to 28 %. What all of them are worth on a building that had no say in
-/// them was measured by leaving one out at a time: docs/evaluation.md has the figures.
+/// The lengths of forks and bends, the limits of corners and the smoothing were chosen on `aces`, `intel`, `mit-killian`
+/// and three simulated floors. What they are worth on a building that had no say in them was measured by leaving one out
+/// at a time: docs/evaluation.md has the figures.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SemanticsConfig {
@@ -49,6 +48,8 @@ pub struct SemanticsConfig {
     pub bend_length_m: f64,
     /// A straighter passage is no corner (see [`super::PlaceSignature::straightness`]).
     pub corner_straightness: f64,
+    /// A passage that is not straighter than this is a corner even with openings beside it.
+    pub sharp_straightness: f64,
     /// The way driven through a corner turns by at least this, radians,
     pub corner_turn_rad: f64,
     /// from so much travel before to so much travel after, metres.
@@ -90,8 +91,9 @@ impl Default for SemanticsConfig {
             bend_half_width_m: 0.6,
             bend_near_m: 3.0,
             bend_length_m: 1.5,
-            corner_straightness: 0.87,
-            corner_turn_rad: 20.0 / 180.0 * PI,
+            corner_straightness: 0.9,
+            sharp_straightness: 0.75,
+            corner_turn_rad: 25.0 / 180.0 * PI,
             turn_reach_m: 2.0,
             dead_end_straightness: 0.8,
             driven_near_m: 1.5,
@@ -137,6 +139,7 @@ impl SemanticsConfig {
             ("bend_near_m", self.bend_near_m, 0.1, 20.0),
             ("bend_length_m", self.bend_length_m, 0.1, 20.0),
             ("corner_straightness", self.corner_straightness, 0.0, 1.0),
+            ("sharp_straightness", self.sharp_straightness, 0.0, 1.0),
             ("corner_turn_rad", self.corner_turn_rad, 0.0, PI),
             ("turn_reach_m", self.turn_reach_m, 0.1, 20.0),
             ("dead_end_straightness", self.dead_end_straightness, 0.0, 1.0),

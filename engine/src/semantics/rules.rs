@@ -9,18 +9,20 @@ use super::signature::PlaceSignature;
 /// 1. Only one driven way leaves the place, and no passage runs straight through it: a dead end.
 /// 2. An open disc as large as a hall holds it: a hall.
 /// 3. Three or more passages leave it and go on: a bifurcation.
-/// 4. The two most opposite passages are not opposite, and the driven way turns: a corner.
+/// 4. The two most opposite passages are not opposite, the driven way turns, and nothing opens beside them, as it does
+///    where rooms are entered, or they bend sharply: a corner.
 /// 5. Otherwise it is a corridor.
 pub fn label_of(config: &SemanticsConfig, place: &PlaceSignature) -> PlaceLabel {
     let is_straighter = |limit: f64| place.straightness.is_some_and(|straightness| straightness >= limit);
     let is_bent = place.straightness.is_some() && !is_straighter(config.corner_straightness);
+    let is_alone = place.num_openings <= 2 || !is_straighter(config.sharp_straightness);
     if place.num_driven <= 1 && !is_straighter(config.dead_end_straightness) {
         PlaceLabel::DeadEnd
     } else if place.hall_radius_m > 0.0 {
         PlaceLabel::Hall
     } else if place.num_passages >= 3 {
         PlaceLabel::Bifurcation
-    } else if is_bent && place.turn_rad >= config.corner_turn_rad {
+    } else if is_bent && is_alone && place.turn_rad >= config.corner_turn_rad {
         PlaceLabel::Corner
     } else {
         PlaceLabel::Corridor

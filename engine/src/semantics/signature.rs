@@ -13,6 +13,9 @@ pub struct PlaceSignature {
     pub half_width_m: f64,
     /// Passages that leave the place, as wide as a door at least, and go on.
     pub num_passages: u32,
+    /// Openings that leave the place where the shape of its passage is judged, as wide as a door at least, whether they
+    /// go on or not: the passage itself counts twice, a room beside it once more.
+    pub num_openings: u32,
     /// Distance between the ends of the two passages that are most opposite, over the way between them: 1 is
     /// straight, 0.71 a right angle. None with fewer than two passages.
     pub straightness: Option<f64>,
@@ -47,11 +50,14 @@ impl<'a> SignatureReader<'a> {
         let near_m =
             (config.fork_near_m + config.fork_near_per_half_width * half_width_m).min(config.fork_near_max_m);
         let far_m = near_m + config.fork_length_m;
-        self.flood.pour(block, at, far_m, |index| block.clearance_m[index] >= door || block.is_driven[index]);
+        let bend_m = config.bend_near_m + config.bend_length_m;
+        self.flood.pour(block, at, far_m.max(bend_m), |index| {
+            block.clearance_m[index] >= door || block.is_driven[index]
+        });
         let forks = self.flood.passages(block, near_m, far_m);
+        let openings = self.flood.passages(block, config.bend_near_m, bend_m);
 
         // The shape of the passage itself is clearer without doors.
-        let bend_m = config.bend_near_m + config.bend_length_m;
         self.flood
             .pour(block, at, bend_m, |index| block.clearance_m[index] >= wide || block.is_driven[index]);
         let arms = self.flood.passages(block, config.bend_near_m, bend_m);
@@ -62,6 +68,7 @@ impl<'a> SignatureReader<'a> {
         PlaceSignature {
             half_width_m,
             num_passages: forks.len() as u32,
+            num_openings: openings.len() as u32,
             straightness: straightness(&arms, bend_m),
             num_driven: driven.len() as u32,
             turn_rad,
