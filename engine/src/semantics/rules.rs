@@ -28,3 +28,31 @@ pub fn label_of(config: &SemanticsConfig, place: &PlaceSignature) -> PlaceLabel 
         PlaceLabel::Corridor
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mild_bend_is_a_corner_where_nothing_opens_beside_it() {
+        let config = SemanticsConfig::default();
+        let label = |straightness: f64, num_openings: u32, turn_deg: f64| {
+            label_of(
+                &config,
+                &PlaceSignature {
+                    num_passages: 2,
+                    num_openings,
+                    num_driven: 2,
+                    straightness: Some(straightness),
+                    turn_rad: turn_deg.to_radians(),
+                    ..PlaceSignature::default()
+                },
+            )
+        };
+        assert_eq!(label(0.85, 2, 45.0), PlaceLabel::Corner);
+        assert_eq!(label(0.85, 3, 45.0), PlaceLabel::Corridor, "a turn into a room");
+        assert_eq!(label(0.71, 3, 90.0), PlaceLabel::Corner, "a right angle beside a door");
+        assert_eq!(label(0.71, 2, 10.0), PlaceLabel::Corridor, "nobody turns there");
+        assert_eq!(label(0.95, 2, 45.0), PlaceLabel::Corridor, "a robot that weaves");
+    }
+}
