@@ -109,8 +109,7 @@ impl LikelihoodField {
         let square =
             (row / SQUARE_SIDE).wrapping_mul(self.squares_per_row).wrapping_add(column / SQUARE_SIDE);
         square.wrapping_mul(SQUARE_SIDE * SQUARE_SIDE)
-            | row % SQUARE_SIDE * SQUARE_SIDE
-            | column % SQUARE_SIDE
+            | ((row % SQUARE_SIDE) * SQUARE_SIDE + column % SQUARE_SIDE)
     }
 
     /// The code at a place of a cell.
