@@ -37,18 +37,18 @@ impl Resampling {
         heirs.weight.resize(num_draws, 1.0);
         let (arch, draws_per_weight) = (Arch::new(), num_draws as f64 / total);
         let ancestors = &mut self.ancestors;
-        arch.dispatch(Draws { weights: &parents.weight, draws_per_weight, start, ancestors });
-        arch.dispatch(Legacy { parents, ancestors, heirs });
+        arch.dispatch(Draws { parents, draws_per_weight, start, ancestors, heirs });
         true
     }
 }
 
-/// The draws of one resampling.
+/// The draws of one resampling, a loop for the widest vectors at hand.
 struct Draws<'a> {
-    weights: &'a [f32],
+    parents: &'a Particles,
     draws_per_weight: f64,
     start: f64,
     ancestors: &'a mut [u32],
+    heirs: &'a mut Particles,
 }
 
 /// Weights that are taken side by side.
@@ -59,19 +59,43 @@ impl WithSimd for Draws<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, _: S) {
-        let most = self.ancestors.len() as u32 - 1;
-        let (mut running, mut num_drawn, mut index) = (0.0, 0, 0);
-        for weights in self.weights.chunks(LANES) {
+        let Self { parents, draws_per_weight, start, ancestors, heirs } = self;
+        let count = parents.len();
+        let (x_m, y_m) = (&parents.x_m[..count], &parents.y_m[..count]);
+        let headings = &parents.heading_turns[..count];
+        let (heirs_x, heirs_y) = (&mut heirs.x_m[..count], &mut heirs.y_m[..count]);
+        let heirs_heading = &mut heirs.heading_turns[..count];
+        let (mut running, mut num_drawn, mut index) = (0.0, 0u32, 0);
+        let (mut num_settled, mut ancestor) = (0usize, 0u32);
+        for weights in parents.weight.chunks(LANES) {
             let mut block = [0.0; LANES];
             block[..weights.len()].copy_from_slice(weights);
             let (sums, end) = running_sums(&block, running);
             running = end;
-            let ends = sums.map(|sum| num_below(sum * self.draws_per_weight - self.start).min(most));
+            let ends = sums.map(|sum| num_below(sum * draws_per_weight - start).min(count as u32));
             for end in &ends[..weights.len()] {
-                self.ancestors[num_drawn as usize] = index;
+                ancestors[num_drawn as usize] = index;
                 num_drawn = *end;
                 index += 1;
             }
+            // The heirs so far are settled, while their ancestors are at hand.
+            let settled = num_settled..num_drawn as usize;
+            let into = heirs_x[settled.clone()]
+                .iter_mut()
+                .zip(&mut heirs_y[settled.clone()])
+                .zip(&mut heirs_heading[settled.clone()]);
+            for (&written, ((x, y), heading)) in ancestors[settled.clone()].iter().zip(into) {
+                ancestor = ancestor.max(written);
+                // No index exceeds the last one; the compiler need not check each.
+                let from = (ancestor as usize).min(count - 1);
+                (*x, *y, *heading) = (x_m[from], y_m[from], headings[from]);
+            }
+            num_settled = num_drawn as usize;
+        }
+        // Rounding may leave the very last draw beyond the sum.
+        let from = (ancestor as usize).min(count - 1);
+        for place in num_settled..count {
+            (heirs_x[place], heirs_y[place], heirs_heading[place]) = (x_m[from], y_m[from], headings[from]);
         }
     }
 }
@@ -98,33 +122,6 @@ fn num_below(number: f64) -> u32 {
     const SHIFT: f64 = 6_755_399_441_055_744.0;
     let sum = number + SHIFT;
     (sum.to_bits() as u32).wrapping_add(u32::from(sum - SHIFT < number))
-}
-
-/// What ancestors leave to their heirs.
-struct Legacy<'a> {
-    parents: &'a Particles,
-    ancestors: &'a [u32],
-    heirs: &'a mut Particles,
-}
-
-impl WithSimd for Legacy<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(self, _: S) {
-        let Self { parents, ancestors, heirs } = self;
-        let count = parents.len();
-        let (x_m, y_m) = (&parents.x_m[..count], &parents.y_m[..count]);
-        let heading_turns = &parents.heading_turns[..count];
-        let into = heirs.x_m.iter_mut().zip(&mut heirs.y_m).zip(&mut heirs.heading_turns);
-        let mut last = 0;
-        for (&ancestor, ((x, y), heading)) in ancestors.iter().zip(into) {
-            last = last.max(ancestor);
-            // No index exceeds the last one; the compiler need not check each.
-            let from = (last as usize).min(count - 1);
-            (*x, *y, *heading) = (x_m[from], y_m[from], heading_turns[from]);
-        }
-    }
 }
 
 #[cfg(test)]
