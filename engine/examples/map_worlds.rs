@@ -219,7 +219,7 @@ const SEEN_M: f64 = 5.0;
 fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2, found: &[Change]) {
     let things = things(worlds);
     let cells: BTreeSet<Cell> = things.iter().flatten().copied().collect();
-    let centres: Vec<Point2> =
+    let centers: Vec<Point2> =
         found.iter().map(|change| world_from_map.transform_point(&change.center)).collect();
     let boxes: Vec<f64> = found.iter().map(|change| 0.5 * change.low.distance(&change.high)).collect();
     let near_cell = |point: &Point2, reach_m: f64| {
@@ -228,7 +228,7 @@ fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2
         (-steps..=steps).any(|dy| (-steps..=steps).any(|dx| cells.contains(&(x + dx, y + dy))))
     };
     let is_right: Vec<bool> =
-        centres.iter().zip(&boxes).map(|(centre, half)| near_cell(centre, NEAR_M.max(*half))).collect();
+        centers.iter().zip(&boxes).map(|(center, half)| near_cell(center, NEAR_M.max(*half))).collect();
     let num_right = is_right.iter().filter(|right| **right).count();
     let right_m2: f64 =
         found.iter().zip(&is_right).filter(|(_, right)| **right).map(|(change, _)| change.area_m2).sum();
@@ -236,10 +236,10 @@ fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2
     let seen: Vec<&Vec<Cell>> =
         things.iter().filter(|thing| (0..2).all(|k| is_seen(thing, &worlds[1], &runs[k]))).collect();
     let is_listed = |thing: &Vec<Cell>| {
-        centres
+        centers
             .iter()
             .zip(&boxes)
-            .any(|(centre, half)| thing.iter().any(|cell| point_of(*cell).distance(centre) <= NEAR_M + half))
+            .any(|(center, half)| thing.iter().any(|cell| point_of(*cell).distance(center) <= NEAR_M + half))
     };
     let num_found = seen.iter().filter(|thing| is_listed(thing)).count();
     println!(

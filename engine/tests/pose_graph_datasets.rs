@@ -104,16 +104,16 @@ fn trajectory_error_m(poses: &[Pose2], truth: &[Pose2]) -> f64 {
         (poses.iter().map(|p| p.x).sum::<f64>() / num, poses.iter().map(|p| p.y).sum::<f64>() / num)
     };
     let (from, to) = (mean(poses), mean(truth));
-    let centred =
+    let centered =
         || poses.iter().zip(truth).map(|(p, q)| ((p.x - from.0, p.y - from.1), (q.x - to.0, q.y - to.1)));
-    let (sin, cos) = centred()
+    let (sin, cos) = centered()
         .fold((0.0, 0.0), |(sin, cos), (p, q)| (sin + p.0 * q.1 - p.1 * q.0, cos + p.0 * q.0 + p.1 * q.1));
     let turn = Pose2::new(0.0, 0.0, f64::atan2(sin, cos));
     let square = |(p, q): ((f64, f64), (f64, f64))| {
         let turned = turn.compose(&Pose2::new(p.0, p.1, 0.0));
         (turned.x - q.0).powi(2) + (turned.y - q.1).powi(2)
     };
-    (centred().map(square).sum::<f64>() / num).sqrt()
+    (centered().map(square).sum::<f64>() / num).sqrt()
 }
 
 /// Optimises with false closures and prints one row of the table.

@@ -121,7 +121,7 @@ fn observations_are_evenly_spaced_and_complete_with_and_without_delay() {
 }
 
 #[test]
-fn keyframes_are_a_fifth_of_a_metre_apart() {
+fn keyframes_are_a_fifth_of_a_meter_apart() {
     let translations =
         translate(Translator::new(&TranslatorConfig::default(), geometry()).unwrap(), &wavy_drive(300, 0.0));
     let keyframes: Vec<_> =

@@ -65,7 +65,8 @@ pub struct LimitsConfig {
     /// Runs whose translator is kept in memory; the one longest idle makes way and is resumed from storage.
     pub num_open_runs_max: usize,
     /// Most localisations at once.
-    pub num_localisations_max: usize,
+    #[serde(alias = "num_localisations_max")]
+    pub num_localizations_max: usize,
     /// Longest a request may take, seconds.
     pub request_timeout_s: u64,
 }
@@ -82,7 +83,7 @@ impl Default for LimitsConfig {
             num_batches_max: 32,
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
-            num_localisations_max: 32,
+            num_localizations_max: 32,
             request_timeout_s: 600,
         }
     }

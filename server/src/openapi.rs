@@ -11,7 +11,7 @@ use crate::router;
     info(
         title = "Locution",
         description = "A query-oriented place-recognition database server: robots post scans and odometry, the \
-                       server answers where they have been before and serves the merged map. Metres, radians, \
+                       server answers where they have been before and serves the merged map. Meters, radians, \
                        nanoseconds."
     ),
     tags(
@@ -20,7 +20,7 @@ use crate::router;
         (name = "texts", description = "What a run became: observations, words, poses"),
         (name = "jobs", description = "Long work: builds of maps"),
         (name = "maps", description = "Maps, their versions and forms, and the matches that hold them together"),
-        (name = "localisation", description = "Where am I, and where was this recorded"),
+        (name = "localization", description = "Where am I, and where was this recorded"),
         (name = "operations", description = "Health, readiness, metrics"),
     )
 )]

@@ -11,7 +11,7 @@ use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, Trans
 /// Longest edge of a picture, pixels.
 const EDGE_MAX_PX: f64 = 2_400.0;
 /// Most pixels that a metre takes.
-const PIXELS_PER_METRE_MAX: f64 = 20.0;
+const PIXELS_PER_METER_MAX: f64 = 20.0;
 /// Empty space around and between components, metres.
 const MARGIN_M: f64 = 2.0;
 
@@ -64,14 +64,14 @@ impl Layout {
         };
         let width_m = panels.iter().map(|panel| size(panel).0 + MARGIN_M).sum::<f64>() + MARGIN_M;
         let height_m = panels.iter().map(|panel| size(panel).1).fold(0.0, f64::max) + 2.0 * MARGIN_M;
-        let scale = (EDGE_MAX_PX / width_m.max(height_m)).min(PIXELS_PER_METRE_MAX);
+        let scale = (EDGE_MAX_PX / width_m.max(height_m)).min(PIXELS_PER_METER_MAX);
         let mut left_m = MARGIN_M;
         let mut corners = Vec::new();
         for panel in panels {
             corners.push((left_m * scale, (height_m - MARGIN_M) * scale));
             left_m += size(panel).0 + MARGIN_M;
         }
-        let pixels = |metres: f64| ((metres * scale).ceil() as u32).clamp(16, EDGE_MAX_PX as u32 + 16);
+        let pixels = |meters: f64| ((meters * scale).ceil() as u32).clamp(16, EDGE_MAX_PX as u32 + 16);
         Self { scale, width_px: pixels(width_m), height_px: pixels(height_m), corners }
     }
 

@@ -22,7 +22,7 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::auth;
 use crate::error::ApiError;
 use crate::handlers::{
-    batches, changes, jobs, labels, localisations, maps, matches, operations, places, queries, runs, sites,
+    batches, changes, jobs, labels, localizations, maps, matches, operations, places, queries, runs, sites,
     texts,
 };
 use crate::openapi::{self, Document};
@@ -61,10 +61,10 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(maps::get_map_tum))
         .routes(routes!(maps::get_picture_png))
         .routes(routes!(maps::get_picture_svg))
-        .routes(routes!(localisations::open_localisation))
-        .routes(routes!(localisations::get_localisation, localisations::close_localisation))
-        .routes(routes!(localisations::localise))
-        .routes(routes!(localisations::query_example))
+        .routes(routes!(localizations::open_localization))
+        .routes(routes!(localizations::get_localization, localizations::close_localization))
+        .routes(routes!(localizations::localize))
+        .routes(routes!(localizations::query_example))
         .routes(routes!(queries::query_words))
         .routes(routes!(queries::query_words_everywhere))
         .routes(routes!(labels::list_labels))
@@ -72,7 +72,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(places::list_places))
         .routes(routes!(places::get_route))
         .routes(routes!(changes::list_changes))
-        .routes(routes!(localisations::query_example_everywhere))
+        .routes(routes!(localizations::query_example_everywhere))
 }
 
 /// The service: routes, documentation, limits, keys.

@@ -133,13 +133,13 @@ async fn cbor_and_compressed_bodies_mean_the_same() {
 
 /// Turns every list of ranges into a byte string of floats.
 fn pack_ranges(tree: &mut ciborium::Value) {
-    let metres = |value: &ciborium::Value| value.as_float().map_or(f32::NAN, |metres| metres as f32);
+    let meters = |value: &ciborium::Value| value.as_float().map_or(f32::NAN, |meters| meters as f32);
     match tree {
         ciborium::Value::Map(entries) => {
             for (key, value) in entries {
                 match (key.as_text(), &value) {
                     (Some("ranges_m"), ciborium::Value::Array(ranges)) => {
-                        let bytes = ranges.iter().flat_map(|range| metres(range).to_le_bytes()).collect();
+                        let bytes = ranges.iter().flat_map(|range| meters(range).to_le_bytes()).collect();
                         *value = ciborium::Value::Bytes(bytes);
                     }
                     _ => pack_ranges(value),

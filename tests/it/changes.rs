@@ -84,8 +84,8 @@ fn number(value: &Value, name: &str) -> f64 {
 
 /// True for a change of a kind about where a block of the world is.
 fn is_at(change: &Value, kind: &str, (x0, y0, x1, y1): Block, world_from_map: &Pose2) -> bool {
-    let centre = Point2::new(number(&change["centre"], "x"), number(&change["centre"], "y"));
-    let place = world_from_map.transform_point(&centre);
+    let center = Point2::new(number(&change["centre"], "x"), number(&change["centre"], "y"));
+    let place = world_from_map.transform_point(&center);
     let reach_m = 0.4;
     change["kind"] == kind
         && (x0 - reach_m..x1 + reach_m).contains(&place.x)

@@ -26,7 +26,7 @@
 
 mod client;
 mod error;
-mod localisations;
+mod localizations;
 mod maps;
 mod pages;
 mod runs;
@@ -35,9 +35,9 @@ mod upload;
 
 pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
-pub use localisations::{ExampleAnswer, Hypothesis, Localisation, LocalisationState};
+pub use localizations::{ExampleAnswer, Hypothesis, Localization, LocalizationState};
 pub use types::{
-    BatchAnswer, Geometry, Job, LabelledStretch, MatchInterval, NewRun, Observation, PlaceMatch, Pose,
+    BatchAnswer, Geometry, Job, LabeledStretch, MatchInterval, NewRun, Observation, PlaceMatch, Pose,
     RunStatus, Scan, SiteStatus, StampedPose, Trajectory, Word, WordId,
 };
 pub use upload::{Encoding, RunUpload};

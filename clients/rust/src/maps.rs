@@ -4,7 +4,7 @@ use reqwest::Method;
 
 use crate::client::{Body, Client};
 use crate::error::ClientError;
-use crate::types::{Job, LabelledStretch, PlaceMatch};
+use crate::types::{Job, LabeledStretch, PlaceMatch};
 
 impl Client {
     /// All matches of a site that pass the filter, a query such as `state=verified` or nothing.
@@ -77,7 +77,7 @@ impl Client {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn labels(&self, site: &str) -> Result<Vec<LabelledStretch>, ClientError> {
+    pub async fn labels(&self, site: &str) -> Result<Vec<LabeledStretch>, ClientError> {
         self.all_pages(&format!("/v1/sites/{site}/labels")).await
     }
 }

@@ -196,7 +196,7 @@ pub struct PlaceMatch {
 
 /// A stretch of driving through places of one label.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-pub struct LabelledStretch {
+pub struct LabeledStretch {
     /// The run that drove it.
     pub run: String,
     /// `corridor`, `corner`, `bifurcation`, `dead-end` or `hall`.

@@ -11,7 +11,7 @@ const BORDER_TOLERANCE_M: f64 = 1.0;
 
 /// One observation with its true and its predicted label.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LabelledObservation<'a> {
+pub struct LabeledObservation<'a> {
     /// Distance driven since the run began, metres.
     pub travel_m: f64,
     /// What a person says; `None` where nobody has labelled.
@@ -46,7 +46,7 @@ pub struct LabelReport {
 /// there. It counts as right for the label that the observation truly has, so that every label keeps its number of
 /// observations, as in the thesis. Without a prediction the predicted label is `none`; observations without a true
 /// label are left out.
-pub fn judge_labels(runs: &[Vec<LabelledObservation<'_>>]) -> LabelReport {
+pub fn judge_labels(runs: &[Vec<LabeledObservation<'_>>]) -> LabelReport {
     let mut confusion: BTreeMap<String, BTreeMap<String, usize>> = BTreeMap::new();
     for run in runs {
         for (idx, observation) in run.iter().enumerate() {
@@ -77,10 +77,10 @@ pub fn judge_labels(runs: &[Vec<LabelledObservation<'_>>]) -> LabelReport {
 }
 
 /// Whether the label truly occurs within the tolerance of an observation, in driving before or after it.
-fn is_near(run: &[LabelledObservation<'_>], idx: usize, label: &str) -> bool {
+fn is_near(run: &[LabeledObservation<'_>], idx: usize, label: &str) -> bool {
     let here_m = run[idx].travel_m;
     let within =
-        |other: &&LabelledObservation<'_>| (other.travel_m - here_m).abs() <= BORDER_TOLERANCE_M + 1e-9;
+        |other: &&LabeledObservation<'_>| (other.travel_m - here_m).abs() <= BORDER_TOLERANCE_M + 1e-9;
     let after = run[idx..].iter().take_while(within);
     let before = run[..idx].iter().rev().take_while(within);
     after.chain(before).any(|other| other.actual == Some(label))
@@ -91,10 +91,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn borders_may_be_a_metre_off() {
+    fn borders_may_be_a_meter_off() {
         let label = |idx: usize, border: usize| if idx < border { "corridor" } else { "corner" };
-        let run: Vec<LabelledObservation> = (0..100)
-            .map(|idx| LabelledObservation {
+        let run: Vec<LabeledObservation> = (0..100)
+            .map(|idx| LabeledObservation {
                 travel_m: 0.1 * idx as f64,
                 actual: Some(label(idx, 50)),
                 predicted: Some(label(idx, 65)),
@@ -110,8 +110,8 @@ mod tests {
 
     #[test]
     fn what_is_missing_is_told_or_left_out() {
-        let unknown = LabelledObservation { travel_m: 0.0, actual: None, predicted: Some("hall") };
-        let unpredicted = LabelledObservation { travel_m: 5.0, actual: Some("hall"), predicted: None };
+        let unknown = LabeledObservation { travel_m: 0.0, actual: None, predicted: Some("hall") };
+        let unpredicted = LabeledObservation { travel_m: 5.0, actual: Some("hall"), predicted: None };
         let report = judge_labels(&[vec![unknown], vec![unpredicted]]);
         assert_eq!(report.confusion.len(), 1);
         assert_eq!(report.confusion["hall"]["none"], 1);

@@ -34,7 +34,7 @@ pub enum TrialOutcome {
 
 /// Metres driven until sure, over the trials that were found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct MetresToConverge {
+pub struct MetersToConverge {
     /// Half of them needed no more; `None` when nothing was found.
     pub median: Option<f64>,
     /// Nine of ten needed no more.
@@ -53,7 +53,8 @@ pub struct LocalizationReport {
     /// Never sure.
     pub honestly_unsure: f64,
     /// How long it took.
-    pub metres_to_converge: MetresToConverge,
+    #[serde(rename = "metres_to_converge")]
+    pub meters_to_converge: MetersToConverge,
 }
 
 impl LocalizationTrial {
@@ -78,7 +79,7 @@ pub fn judge_localization(trials: &[LocalizationTrial]) -> LocalizationReport {
         found: share(driven_m.len(), trials.len()),
         wrongly_sure: share(of(TrialOutcome::WronglySure).count(), trials.len()),
         honestly_unsure: share(of(TrialOutcome::HonestlyUnsure).count(), trials.len()),
-        metres_to_converge: MetresToConverge {
+        meters_to_converge: MetersToConverge {
             median: quantile(&driven_m, 0.5),
             p90: quantile(&driven_m, 0.9),
         },
@@ -101,6 +102,6 @@ mod tests {
         ]);
         assert_eq!((report.trials, report.found), (4, 0.5));
         assert_eq!((report.wrongly_sure, report.honestly_unsure), (0.25, 0.25));
-        assert_eq!(report.metres_to_converge, MetresToConverge { median: Some(6.0), p90: Some(8.0) });
+        assert_eq!(report.meters_to_converge, MetersToConverge { median: Some(6.0), p90: Some(8.0) });
     }
 }

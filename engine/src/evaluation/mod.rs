@@ -18,9 +18,9 @@ mod trajectory_error;
 mod truth_join;
 
 pub use examples::{ExampleReport, ExampleTrial, LatencyMs, ReliabilityBin, judge_examples};
-pub use labels::{LabelReport, LabelScore, LabelledObservation, judge_labels};
+pub use labels::{LabelReport, LabelScore, LabeledObservation, judge_labels};
 pub use localization::{
-    LocalizationReport, LocalizationTrial, MetresToConverge, TrialOutcome, judge_localization,
+    LocalizationReport, LocalizationTrial, MetersToConverge, TrialOutcome, judge_localization,
 };
 pub use map_error::{EstimatedPose, MapErrorReport, judge_map};
 pub use recognition::{

@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn truth_is_not_stretched_beyond_a_metre() {
+    fn truth_is_not_stretched_beyond_a_meter() {
         let scans: Vec<OdometryPose> = (0..=6).map(|idx| scan(idx, 0.6 * idx as f64)).collect();
         let joined = join_truth(&scans, &[truth(3, 0.0, 0.0)]);
         let known: Vec<bool> = joined.iter().map(Option::is_some).collect();

@@ -277,15 +277,15 @@ fn median_mounting(mountings: &[Pose2]) -> Pose2 {
         values.get(values.len() / 2).copied().unwrap_or(0.0)
     };
     let coordinate = |of: fn(&Pose2) -> f64| median(mountings.iter().map(of).collect());
-    let centre =
+    let center =
         Pose2::new(coordinate(|pose| pose.x), coordinate(|pose| pose.y), coordinate(|pose| pose.theta));
-    let spread_m = median(mountings.iter().map(|pose| pose.distance(&centre)).collect());
-    let spread_rad = median(mountings.iter().map(|pose| centre.between(pose).theta.abs()).collect());
+    let spread_m = median(mountings.iter().map(|pose| pose.distance(&center)).collect());
+    let spread_rad = median(mountings.iter().map(|pose| center.between(pose).theta.abs()).collect());
     if spread_m > 0.02 || spread_rad > 0.02 {
         return Pose2::identity();
     }
     let rounded = |value: f64| (value * 1e4).round() / 1e4 + 0.0;
-    Pose2::new(rounded(centre.x), rounded(centre.y), rounded(centre.theta))
+    Pose2::new(rounded(center.x), rounded(center.y), rounded(center.theta))
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ pub use carmen_writer::{carmen_header, carmen_scan_lines};
 pub use decimal_time::{format_seconds, parse_seconds_ns};
 use fields::Fields;
 pub use fields::FormatError;
-pub use labels::{LabelledPlaces, LabelledRegion};
+pub use labels::{LabeledPlaces, LabeledRegion};
 pub use map_server::{GrayImage, MapServerYaml, parse_map_server_yaml, parse_pgm, write_pgm};
 pub use relations::{Relation, parse_relations};
 pub use truth::{TruthPose, parse_truth, truth_text};

@@ -40,7 +40,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cells_contain_their_centres_on_both_sides_of_the_origin() {
+    fn cells_contain_their_centers_on_both_sides_of_the_origin() {
         for cell in [Cell::new(0, 0), Cell::new(-1, -1), Cell::new(17, -42)] {
             assert_eq!(Cell::containing(&cell.center(0.1), 0.1), cell);
         }

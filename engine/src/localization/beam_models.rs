@@ -161,7 +161,7 @@ mod tests {
         let map = GridMap::drawn(&["######", "#....#", "######"], 0.5);
         let config = BeamModelConfig { sigma_m: 0.5, random_share: 0.25, ..Default::default() };
         let model = BeamModel::new(&map, &geometry(), &[0.25, 1.25, 0.25], BeamComparison::Beams, &config);
-        let half_a_metre_off = model.likelihood(&Pose2::new(0.75, 0.75, 0.0));
-        assert!((half_a_metre_off - (0.75 * (-0.5f64).exp() + 0.25)).abs() < 1e-9, "{half_a_metre_off}");
+        let half_a_meter_off = model.likelihood(&Pose2::new(0.75, 0.75, 0.0));
+        assert!((half_a_meter_off - (0.75 * (-0.5f64).exp() + 0.25)).abs() < 1e-9, "{half_a_meter_off}");
     }
 }

@@ -92,7 +92,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
 
     /// Fills of the centres of a row from `column` on; None where the centre is not free.
     pub fn sweep(&mut self, column: i64, row: i64, fills: &mut [Option<Fill>]) {
-        Arch::new().dispatch(RowOfCentres { disc: self, column, row, fills });
+        Arch::new().dispatch(RowOfCenters { disc: self, column, row, fills });
     }
 
     #[inline(always)]
@@ -236,13 +236,13 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
 
     /// Spreads from the reached cells on the stack to whatever hangs on them.
     fn flood_on(&mut self, arc: usize) {
-        let centre = self.left + arc;
+        let center = self.left + arc;
         for _ in 0..self.stack.len() {
             let Some((row, column)) = self.stack.pop() else { break };
             for (row, column) in
                 [(row, column - 1), (row, column + 1), (row.wrapping_sub(1), column), (row + 1, column)]
             {
-                if row < self.shape.num_rows() && column.abs_diff(centre) <= self.shape.half_chords[row] {
+                if row < self.shape.num_rows() && column.abs_diff(center) <= self.shape.half_chords[row] {
                     self.runs.push((row, column));
                 }
             }
@@ -250,7 +250,7 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
         while let Some((row, column)) = self.runs.pop() {
             let entered = column - self.shape.half_chords[row] - self.left;
             if self.is_free(row, column) && !has(&self.reach[entered], row) {
-                self.take_run(row, column, centre - self.kernel.radius());
+                self.take_run(row, column, center - self.kernel.radius());
             }
         }
     }
@@ -347,14 +347,14 @@ impl<'a, const W: usize> DiscSweep<'a, W> {
 }
 
 /// The fills of a row of centres, compiled for the words and counts of bits that the processor at hand has.
-struct RowOfCentres<'a, 'b, const W: usize> {
+struct RowOfCenters<'a, 'b, const W: usize> {
     disc: &'a mut DiscSweep<'b, W>,
     column: i64,
     row: i64,
     fills: &'a mut [Option<Fill>],
 }
 
-impl<const W: usize> WithSimd for RowOfCentres<'_, '_, W> {
+impl<const W: usize> WithSimd for RowOfCenters<'_, '_, W> {
     type Output = ();
 
     #[inline(always)]

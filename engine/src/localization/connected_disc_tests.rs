@@ -16,11 +16,11 @@ use crate::geometry::Point2;
 /// Algorithm 3.1, cell by cell, with the tolerance of SPEC section 3.
 fn literal_fill(
     map: &GridMap,
-    centre: (i64, i64),
+    center: (i64, i64),
     (profile, h): (KernelProfile, f64),
     most_open: u32,
 ) -> Option<Fill> {
-    if map.state(centre.0, centre.1) != CellState::Free {
+    if map.state(center.0, center.1) != CellState::Free {
         return None;
     }
     let (mut mass, mut whole) = (0.0, 0.0);
@@ -30,10 +30,10 @@ fn literal_fill(
         whole += if d < h { height(profile, d, h) } else { 0.0 };
     }
     let mut open = HashSet::new();
-    let mut seen = HashSet::from([centre]);
-    let mut queue = VecDeque::from([centre]);
+    let mut seen = HashSet::from([center]);
+    let mut queue = VecDeque::from([center]);
     while let Some((x, y)) = queue.pop_front() {
-        let d = ((x - centre.0) as f64).hypot((y - centre.1) as f64);
+        let d = ((x - center.0) as f64).hypot((y - center.1) as f64);
         if d >= h {
             continue;
         }

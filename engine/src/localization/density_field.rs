@@ -362,9 +362,9 @@ pub fn observe(
             }
             let bandwidth_cells = bandwidth_m / local_map.resolution_m();
             let densities = densities_around(local_map, config, bandwidth_cells, (column, row));
-            let centre = densities.len() / 2;
-            let descent_turns = stable_descent(&densities, AROUND, &config.gradient)[centre];
-            let density = densities[centre];
+            let center = densities.len() / 2;
+            let descent_turns = stable_descent(&densities, AROUND, &config.gradient)[center];
+            let density = densities[center];
             KernelReading {
                 density: density.is_finite().then_some(density),
                 descent_rad: descent_turns.is_finite().then(|| to_robot(descent_turns)),

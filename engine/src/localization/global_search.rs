@@ -166,7 +166,7 @@ impl SearchPyramid {
     /// Points of the robot's frame as cells after a turn.
     fn turned(&self, points: &[Point2], heading: f64) -> Vec<(i32, i32)> {
         let (sin, cos) = heading.sin_cos();
-        let cell = |metres: f64| (metres / self.cell_m).round() as i32;
+        let cell = |meters: f64| (meters / self.cell_m).round() as i32;
         points.iter().map(|p| (cell(cos * p.x - sin * p.y), cell(sin * p.x + cos * p.y))).collect()
     }
 

@@ -72,14 +72,14 @@ pub(super) fn cluster(particles: &Particles, origin: &Point2, config: &ClusterCo
         let mut cluster = members;
         let mut open = vec![first];
         while let Some(bin) = open.pop() {
-            for neighbour in neighbours(bin, config.num_heading_bins as i32) {
-                if let Some(members) = bins.remove(&neighbour) {
+            for neighbor in neighbors(bin, config.num_heading_bins as i32) {
+                if let Some(members) = bins.remove(&neighbor) {
                     cluster.extend(members);
-                    open.push(neighbour);
+                    open.push(neighbor);
                 }
             }
         }
-        let hypothesis = summarise(particles, &cluster, origin, total);
+        let hypothesis = summarize(particles, &cluster, origin, total);
         if hypothesis.probability >= config.min_probability {
             hypotheses.push(hypothesis);
         }
@@ -89,7 +89,7 @@ pub(super) fn cluster(particles: &Particles, origin: &Point2, config: &ClusterCo
 }
 
 fn bin_of(particles: &Particles, index: usize, config: &ClusterConfig) -> Bin {
-    let cell = |metres: f32| (f64::from(metres) / config.bin_m).floor() as i32;
+    let cell = |meters: f32| (f64::from(meters) / config.bin_m).floor() as i32;
     let heading = (f64::from(particles.heading_turns[index]) * config.num_heading_bins as f64).floor() as i32;
     (
         cell(particles.x_m[index]),
@@ -98,7 +98,7 @@ fn bin_of(particles: &Particles, index: usize, config: &ClusterConfig) -> Bin {
     )
 }
 
-fn neighbours((x, y, heading): Bin, num_headings: i32) -> impl Iterator<Item = Bin> {
+fn neighbors((x, y, heading): Bin, num_headings: i32) -> impl Iterator<Item = Bin> {
     (0..27).map(move |code| {
         let (dx, dy, turn) = (code % 3 - 1, code / 3 % 3 - 1, code / 9 - 1);
         (x + dx, y + dy, (heading + turn).rem_euclid(num_headings))
@@ -106,7 +106,7 @@ fn neighbours((x, y, heading): Bin, num_headings: i32) -> impl Iterator<Item = B
 }
 
 /// Weighted mean and covariance of some particles; headings are averaged around the direction of their sum.
-fn summarise(particles: &Particles, members: &[u32], origin: &Point2, total: f64) -> Hypothesis {
+fn summarize(particles: &Particles, members: &[u32], origin: &Point2, total: f64) -> Hypothesis {
     let (mut mass, mut x, mut y, mut sin, mut cos) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let coordinates = |member: u32| {
         let index = member as usize;

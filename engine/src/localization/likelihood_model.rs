@@ -152,7 +152,7 @@ impl WithSimd for Scoring<'_> {
         let scale = (1.0 / self.field.resolution_m()) as f32;
         // The codes begin with a border of one cell. What is so far off the map sees nothing of it.
         let position =
-            |metres: f32| fixed(f64::from((metres * scale).clamp(-FARTHEST_CELLS, FARTHEST_CELLS)) + 1.0);
+            |meters: f32| fixed(f64::from((meters * scale).clamp(-FARTHEST_CELLS, FARTHEST_CELLS)) + 1.0);
         let mut scores = vec![0; x_m.len()];
         for (score, ((&x, &y), &turns)) in scores.iter_mut().zip(x_m.iter().zip(y_m).zip(heading_turns)) {
             *score = self.score((position(x), position(y)), self.turned.at(heading_step(turns)));

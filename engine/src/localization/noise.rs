@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn neighbours_and_sequences_are_independent() {
+    fn neighbors_and_sequences_are_independent() {
         let rng = &mut ChaCha8Rng::seed_from_u64(5);
         let (one, other) = (Noise::new(rng), Noise::new(rng));
         let correlation = |pair: &dyn Fn(u32) -> (f32, f32)| {

@@ -25,7 +25,7 @@ impl ServedMap {
     pub fn build(grid: GridMap, density: &DensityFieldConfig, likelihood: &LikelihoodFieldConfig) -> Self {
         let density = DensityField::build(&grid, density);
         let likelihood = LikelihoodField::build(&grid, likelihood);
-        let free_cells = free_cells_by_neighbourhood(&grid);
+        let free_cells = free_cells_by_neighborhood(&grid);
         let pyramid = SearchPyramid::build(&grid, &likelihood);
         Self { grid, density, likelihood, pyramid, free_cells }
     }
@@ -43,7 +43,7 @@ impl ServedMap {
 }
 
 /// Free cells square by square: particles sown in this order touch memory in order.
-fn free_cells_by_neighbourhood(grid: &GridMap) -> Vec<u32> {
+fn free_cells_by_neighborhood(grid: &GridMap) -> Vec<u32> {
     const SIDE: usize = 8;
     let (width, height) = (grid.width(), grid.height());
     let mut cells = Vec::with_capacity(grid.num_free());

@@ -133,7 +133,7 @@ pub(super) fn drive() -> Vec<Pose2> {
     poses
 }
 
-fn localise(seed: u64, map: &ServedMap) -> Vec<Hypothesis> {
+fn localize(seed: u64, map: &ServedMap) -> Vec<Hypothesis> {
     let config = ParticleFilterConfig { num_particles: 8000, ..Default::default() };
     let fields = DensityFieldConfig::default();
     let mut filter = ParticleFilter::global(map, config, seed);
@@ -148,7 +148,7 @@ fn localise(seed: u64, map: &ServedMap) -> Vec<Hypothesis> {
 #[test]
 fn densities_alone_find_the_robot_and_the_seed_repeats_it() {
     let map = served();
-    let found = localise(4, &map);
+    let found = localize(4, &map);
     let truth = drive()[drive().len() - 1];
     assert!(found[0].map_from_robot.distance(&truth) < 0.5, "{:?} is not {truth:?}", found[0]);
     assert!(
@@ -156,7 +156,7 @@ fn densities_alone_find_the_robot_and_the_seed_repeats_it() {
         "{:?} is not {truth:?}",
         found[0]
     );
-    assert_eq!(localise(4, &map), found);
+    assert_eq!(localize(4, &map), found);
 }
 
 #[test]

@@ -53,20 +53,20 @@ impl CoarseGraph {
     ///
     /// # Errors
     /// Whatever the optimiser cannot solve.
-    pub fn optimise(
+    pub fn optimize(
         &mut self,
         set: &AnchorSet,
         closures: &[Closure],
         config: &MappingConfig,
     ) -> Result<Vec<bool>, PoseGraphError> {
-        self.optimise_within(set, closures, &|_| true, config)
+        self.optimize_within(set, closures, &|_| true, config)
     }
 
     /// Optimises only the anchors for which `is_in_scope`; nothing but constraints between them counts.
     ///
     /// # Errors
     /// Whatever the optimiser cannot solve.
-    pub fn optimise_within(
+    pub fn optimize_within(
         &mut self,
         set: &AnchorSet,
         closures: &[Closure],
@@ -120,7 +120,7 @@ impl CoarseGraph {
     }
 
     /// The largest set of closures between two components that agree pair by pair, by index, ascending; `is_in_scope`
-    /// holds for the anchors of the two. Only after [`CoarseGraph::optimise`].
+    /// holds for the anchors of the two. Only after [`CoarseGraph::optimize`].
     ///
     /// # Errors
     /// Whatever the graph cannot solve.
@@ -145,7 +145,7 @@ impl CoarseGraph {
         deviation2(&closure.fit.earlier_from_later, &relative, &with_floor(&closure.fit.covariance, config))
     }
 
-    /// Answers how sure the graph is of relative poses; only after [`CoarseGraph::optimise`].
+    /// Answers how sure the graph is of relative poses; only after [`CoarseGraph::optimize`].
     ///
     /// # Errors
     /// Whatever the factorisation cannot solve.

@@ -49,7 +49,8 @@ pub struct MappingConfig {
     /// Drives that run this close beside each other in the map are matched, metres.
     pub beside_m: f64,
     /// Neighbours within this distance in the map are registered, metres.
-    pub neighbour_distance_m: f64,
+    #[serde(alias = "neighbour_distance_m")]
+    pub neighbor_distance_m: f64,
     /// Widest search around the predicted place, metres.
     pub max_search_m: f64,
     /// Widest search around the predicted heading, radians.
@@ -109,7 +110,7 @@ impl Default for MappingConfig {
             min_overlap: 0.25,
             min_gap_m: 10.0,
             beside_m: 1.1,
-            neighbour_distance_m: 5.0,
+            neighbor_distance_m: 5.0,
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
             max_rounds: 8,
@@ -148,7 +149,7 @@ impl MappingConfig {
             ("fit_floor_m", self.fit_floor_m),
             ("fit_floor_rad", self.fit_floor_rad),
             ("beside_m", self.beside_m),
-            ("neighbour_distance_m", self.neighbour_distance_m),
+            ("neighbour_distance_m", self.neighbor_distance_m),
             ("max_search_m", self.max_search_m),
             ("max_search_turn_rad", self.max_search_turn_rad),
             ("max_chi2", self.max_chi2),

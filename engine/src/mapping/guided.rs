@@ -12,7 +12,7 @@ use crate::registration::SearchWindow;
 
 /// A pair of anchors that the graph places near each other.
 #[derive(Clone, Copy, Debug)]
-struct Neighbours {
+struct Neighbors {
     request: Request,
     predicted: Pose2,
     covariance: Matrix3<f64>,
@@ -41,13 +41,13 @@ pub(crate) fn guided_closures(
     config: &MappingConfig,
     memo: &mut RegistrationMemo,
 ) -> Result<GuidedRound, PoseGraphError> {
-    let neighbours = find_neighbours(set, graph, may_match, config)?;
-    let requests: Vec<Request> = neighbours.iter().map(|pair| pair.request).collect();
+    let neighbors = find_neighbors(set, graph, may_match, config)?;
+    let requests: Vec<Request> = neighbors.iter().map(|pair| pair.request).collect();
     let fits = memo.answers(&requests, set, &config.submap);
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
-    for (pair, fit) in neighbours.iter().zip(fits) {
+    for (pair, fit) in neighbors.iter().zip(fits) {
         let Some(fit) = fit else { continue };
         if fit.agreement < config.min_agreement || fit.overlap < config.min_overlap {
             continue;
@@ -71,13 +71,13 @@ pub(crate) fn guided_closures(
     Ok(GuidedRound { closures: supported, tried, refused })
 }
 
-fn find_neighbours(
+fn find_neighbors(
     set: &AnchorSet,
     graph: &CoarseGraph,
     may_match: &impl Fn(usize, usize) -> bool,
     config: &MappingConfig,
-) -> Result<Vec<Neighbours>, PoseGraphError> {
-    let reach_m = config.neighbour_distance_m + config.max_search_m;
+) -> Result<Vec<Neighbors>, PoseGraphError> {
+    let reach_m = config.neighbor_distance_m + config.max_search_m;
     let mut solver = graph.covariances()?;
     let mut found = Vec::new();
     for later in 0..set.anchors.len() {
@@ -94,16 +94,16 @@ fn find_neighbours(
             let covariance = crate::registration::rotated(&covariance, predicted.theta);
             let place_sd_m = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
             let turn_sd = covariance[(2, 2)].sqrt();
-            if predicted.x.hypot(predicted.y) > config.neighbour_distance_m + 2.0 * place_sd_m {
+            if predicted.x.hypot(predicted.y) > config.neighbor_distance_m + 2.0 * place_sd_m {
                 continue;
             }
             let window = SearchWindow {
-                centre: predicted,
+                center: predicted,
                 half_m: (3.0 * place_sd_m + 0.25).min(config.max_search_m),
                 half_turn_rad: (3.0 * turn_sd + 0.05).min(config.max_search_turn_rad),
             };
             let request = Request { earlier: earlier as usize, later, window };
-            found.push(Neighbours { request, predicted, covariance, place_sd_m });
+            found.push(Neighbors { request, predicted, covariance, place_sd_m });
         }
     }
     Ok(found)

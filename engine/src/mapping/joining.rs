@@ -58,7 +58,7 @@ pub(crate) fn registered_candidates(
         .map(|candidate| Request {
             earlier: candidate.earlier,
             later: candidate.later,
-            window: SearchWindow { centre: candidate.predicted, half_m: 2.0, half_turn_rad: 0.35 },
+            window: SearchWindow { center: candidate.predicted, half_m: 2.0, half_turn_rad: 0.35 },
         })
         .collect();
     let fits = memo.answers(&requests, set, &config.submap);

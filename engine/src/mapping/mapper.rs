@@ -91,7 +91,7 @@ impl<'a> Mapper<'a> {
         judgements: &'a Judgements<'a>,
     ) -> Result<Self, PoseGraphError> {
         let mut graph = CoarseGraph::new(set, runs, config);
-        graph.optimise(set, &[], config)?;
+        graph.optimize(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
         let draft = Draft { components, graph, closures: Vec::new(), tried: Vec::new(), refused: Vec::new() };
         Ok(Self { config, runs, set, judgements, draft, has_joined: false, unfit: Vec::new() })
@@ -107,7 +107,7 @@ impl<'a> Mapper<'a> {
                     && !self.judgements.forbid(earlier, later)
             };
             let round = guided_closures(self.set, &self.draft.graph, &may_match, self.config, memo)?;
-            let kept = self.draft.graph.optimise(self.set, &round.closures, self.config)?;
+            let kept = self.draft.graph.optimize(self.set, &round.closures, self.config)?;
             let (found, dropped) = sorted_out(round.closures, &kept);
             let refused = round.refused.into_iter().chain(dropped);
             let refusal = |closure| Refusal {
@@ -250,7 +250,7 @@ impl<'a> Mapper<'a> {
         let mut across = hypothesis.closures.clone();
         for is_last in [false, false, true] {
             let closures = [inside.as_slice(), across.as_slice()].concat();
-            let kept = self.draft.graph.optimise_within(self.set, &closures, &is_in_scope, self.config)?;
+            let kept = self.draft.graph.optimize_within(self.set, &closures, &is_in_scope, self.config)?;
             if !kept[inside.len()..].contains(&true) {
                 return Ok(None);
             }
@@ -277,7 +277,7 @@ impl<'a> Mapper<'a> {
         report.one_sided_contradiction =
             opinions.of_later.contradiction().min(opinions.of_earlier.contradiction());
         report.own_contradiction = self.own_contradiction(&guests).max(self.own_contradiction(&hosts));
-        report.is_vetoed = self.judgements.contradict(poses, self.config.neighbour_distance_m, is_guest);
+        report.is_vetoed = self.judgements.contradict(poses, self.config.neighbor_distance_m, is_guest);
         Ok(Some(report))
     }
 

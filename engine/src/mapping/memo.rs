@@ -80,19 +80,19 @@ const GRAIN_RAD: f64 = 0.05;
 fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
     let window = &request.window;
     let grains = [
-        (window.centre.x / GRAIN_M).round() as i32,
-        (window.centre.y / GRAIN_M).round() as i32,
-        (window.centre.theta / GRAIN_RAD).round() as i32,
+        (window.center.x / GRAIN_M).round() as i32,
+        (window.center.y / GRAIN_M).round() as i32,
+        (window.center.theta / GRAIN_RAD).round() as i32,
         (window.half_m / GRAIN_M).ceil() as i32,
         (window.half_turn_rad / GRAIN_RAD).ceil() as i32,
     ];
-    let centre = Pose2::new(
+    let center = Pose2::new(
         f64::from(grains[0]) * GRAIN_M,
         f64::from(grains[1]) * GRAIN_M,
         f64::from(grains[2]) * GRAIN_RAD,
     );
     let window = SearchWindow {
-        centre,
+        center,
         half_m: f64::from(grains[3]) * GRAIN_M,
         half_turn_rad: f64::from(grains[4]) * GRAIN_RAD,
     };

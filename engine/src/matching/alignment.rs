@@ -108,8 +108,8 @@ pub(super) mod tests {
         densities.into_iter().enumerate().map(observation).collect()
     }
 
-    fn bumpy(metre: f32) -> f32 {
-        0.5 + 0.2 * (metre * 1.3).sin() + 0.1 * (metre * 3.7).cos()
+    fn bumpy(meter: f32) -> f32 {
+        0.5 + 0.2 * (meter * 1.3).sin() + 0.1 * (meter * 3.7).cos()
     }
 
     #[test]

@@ -14,12 +14,12 @@ pub fn spanning_tree_start(graph: &mut PoseGraph, is_known: &[bool]) {
     let mut is_placed = is_known.to_vec();
     is_placed.resize(poses.len(), false);
     let known: Vec<u32> = (0..poses.len() as u32).filter(|&pose| is_placed[pose as usize]).collect();
-    place_neighbours(graph.constraints(), &tree, known, &mut is_placed, &mut poses);
+    place_neighbors(graph.constraints(), &tree, known, &mut is_placed, &mut poses);
     for root in 0..poses.len() as u32 {
         if !is_placed[root as usize] {
             is_placed[root as usize] = true;
             poses[root as usize] = Pose2::identity();
-            place_neighbours(graph.constraints(), &tree, vec![root], &mut is_placed, &mut poses);
+            place_neighbors(graph.constraints(), &tree, vec![root], &mut is_placed, &mut poses);
         }
     }
     graph.replace_poses(poses);
@@ -40,7 +40,7 @@ fn spanning_tree(graph: &PoseGraph) -> Vec<Vec<u32>> {
     tree
 }
 
-fn place_neighbours(
+fn place_neighbors(
     constraints: &[PoseConstraint],
     tree: &[Vec<u32>],
     mut stack: Vec<u32>,

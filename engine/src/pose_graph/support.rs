@@ -160,11 +160,11 @@ impl Chain {
 
     /// Pose `to` seen from pose `from` along the chain; `None` where it is broken.
     fn between(&self, from: u32, to: u32) -> Option<Uncertain> {
-        let mut travelled = Uncertain::EXACT;
+        let mut traveled = Uncertain::EXACT;
         for step in &self.steps[from.min(to) as usize..from.max(to) as usize] {
-            travelled = travelled.compose(step.as_ref()?);
+            traveled = traveled.compose(step.as_ref()?);
         }
-        Some(if from <= to { travelled } else { travelled.inverse() })
+        Some(if from <= to { traveled } else { traveled.inverse() })
     }
 
     /// χ² of the cycle over both closures and the odometry between their ends.

@@ -57,7 +57,7 @@ impl Example {
         scans: &[Scan],
         config: &RecallConfig,
     ) -> Result<Option<Self>, ConfigError> {
-        let scans = last_metres(scans, config.length_max_m);
+        let scans = last_meters(scans, config.length_max_m);
         let mut translator = Translator::new(translator, geometry.clone())?;
         let mut observations = Vec::new();
         let mut keyframes: Vec<Keyframe> = Vec::new();
@@ -110,7 +110,7 @@ impl Example {
 }
 
 /// The scans of the last so many metres of odometry.
-fn last_metres(scans: &[Scan], length_m: f64) -> &[Scan] {
+fn last_meters(scans: &[Scan], length_m: f64) -> &[Scan] {
     let mut travel_m = 0.0;
     let mut first = scans.len().saturating_sub(1);
     while first > 0 && travel_m <= length_m {

@@ -152,7 +152,7 @@ impl PlaceIndex {
     ) -> Vec<Seen> {
         let search = |seen: Seen| {
             let window = SearchWindow {
-                centre: seen.proposal.map_from_submap,
+                center: seen.proposal.map_from_submap,
                 half_m: config.search_half_m,
                 half_turn_rad: config.search_half_turn_rad,
             };
@@ -166,7 +166,7 @@ impl PlaceIndex {
     fn judge(&self, example: &Example, seen: Seen, config: &RecallConfig) -> Option<(Seen, AreaFit, f64)> {
         let area = self.areas.get(seen.proposal.component as usize)?;
         let window = SearchWindow {
-            centre: seen.map_from_submap,
+            center: seen.map_from_submap,
             half_m: config.search_half_m,
             half_turn_rad: config.search_half_turn_rad,
         };
@@ -187,7 +187,7 @@ impl PlaceIndex {
         let area = self.areas.get(seen.proposal.component as usize)?;
         let map_from_run = fit.map_from_submap.compose(&example.run_from_submap.inverse());
         let tail = map_from_run.compose(&example.run_from_tail);
-        let near = SearchWindow { centre: tail, half_m: TAIL_WINDOW.0, half_turn_rad: TAIL_WINDOW.1 };
+        let near = SearchWindow { center: tail, half_m: TAIL_WINDOW.0, half_turn_rad: TAIL_WINDOW.1 };
         let tail_fit = area.align(&example.tail, &tail, &near, &config.submap);
         let tail = tail_fit.map_or(tail, |fit| fit.map_from_submap);
         let submap_from_robot = example.run_from_submap.between(&example.run_from_robot);

@@ -201,9 +201,9 @@ impl Area {
         window: &SearchWindow,
         settings: &AreaSearch,
     ) -> Option<(Pose2, f64)> {
-        let (corner, pyramid) = self.cut(&window.centre, settings.reach_m + window.half_m);
-        let centre = Pose2::new(window.centre.x - corner.x, window.centre.y - corner.y, window.centre.theta);
-        let around = SearchWindow { centre, ..*window };
+        let (corner, pyramid) = self.cut(&window.center, settings.reach_m + window.half_m);
+        let center = Pose2::new(window.center.x - corner.x, window.center.y - corner.y, window.center.theta);
+        let around = SearchWindow { center, ..*window };
         let (found, share) =
             pyramid.best_pose_above(settings.min_share, points, &around, settings.turn_step_rad)?;
         Some((Pose2::new(found.x + corner.x, found.y + corner.y, found.theta), share))
@@ -257,8 +257,8 @@ impl Area {
     }
 
     /// Centres of the surface cells within the reach of a submap at a pose.
-    fn surface_points(&self, centre: &Pose2, config: &SubmapConfig) -> Vec<Point2> {
-        let (column, row) = cell_at(centre.x, centre.y, self.cell_m);
+    fn surface_points(&self, center: &Pose2, config: &SubmapConfig) -> Vec<Point2> {
+        let (column, row) = cell_at(center.x, center.y, self.cell_m);
         let half = (config.radius_m / self.cell_m) as i32;
         let mut points = Vec::new();
         self.for_rows((column - half, row - half), 2 * half + 1, |(first, row), states| {
@@ -271,8 +271,8 @@ impl Area {
     }
 
     /// The search pyramid of the cells around a pose, and where its origin lies in the map.
-    fn cut(&self, centre: &Pose2, radius_m: f64) -> (Point2, SearchPyramid) {
-        let middle = cell_at(centre.x, centre.y, self.cell_m);
+    fn cut(&self, center: &Pose2, radius_m: f64) -> (Point2, SearchPyramid) {
+        let middle = cell_at(center.x, center.y, self.cell_m);
         let mut grid = EvidenceGrid::new(radius_m, self.cell_m);
         let (half, side) = (grid.half(), 2 * grid.half() + 1);
         let (left, bottom) = (middle.0 - half, middle.1 - half);

@@ -12,7 +12,7 @@ use crate::geometry::{Point2, Pose2};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SearchWindow {
     /// Pose in the middle of the window.
-    pub centre: Pose2,
+    pub center: Pose2,
     /// Half width in x and y, metres.
     pub half_m: f64,
     /// Half width of the heading, radians.
@@ -87,9 +87,9 @@ impl SearchPyramid {
         let top = NUM_LEVELS - 1;
         let block = 1 << top;
         let headings: Vec<f64> =
-            (-num_turns..=num_turns).map(|k| window.centre.theta + f64::from(k) * turn_step_rad).collect();
+            (-num_turns..=num_turns).map(|k| window.center.theta + f64::from(k) * turn_step_rad).collect();
         let placed: Vec<Vec<(i32, i32)>> =
-            headings.iter().map(|&theta| self.cells_at(points, &window.centre, theta)).collect();
+            headings.iter().map(|&theta| self.cells_at(points, &window.center, theta)).collect();
         let mut blocks = Vec::new();
         for (turn_idx, cells) in placed.iter().enumerate() {
             for y in (-half_cells..=half_cells).step_by(block) {
@@ -109,8 +109,8 @@ impl SearchPyramid {
         }
         best.block.map(|best| {
             let pose = Pose2::new(
-                window.centre.x + f64::from(best.x) * self.cell_m,
-                window.centre.y + f64::from(best.y) * self.cell_m,
+                window.center.x + f64::from(best.x) * self.cell_m,
+                window.center.y + f64::from(best.y) * self.cell_m,
                 headings[best.turn_idx],
             );
             (pose, f64::from(best.bound) / (2.0 * points.len() as f64))
@@ -166,13 +166,13 @@ impl SearchPyramid {
         }
     }
 
-    fn cells_at(&self, points: &[Point2], centre: &Pose2, theta: f64) -> Vec<(i32, i32)> {
+    fn cells_at(&self, points: &[Point2], center: &Pose2, theta: f64) -> Vec<(i32, i32)> {
         let (sin, cos) = theta.sin_cos();
         points
             .iter()
             .map(|point| {
-                let x = centre.x + cos * point.x - sin * point.y;
-                let y = centre.y + sin * point.x + cos * point.y;
+                let x = center.x + cos * point.x - sin * point.y;
+                let y = center.y + sin * point.x + cos * point.y;
                 (
                     (x / self.cell_m + 0.5).floor() as i32 + self.half,
                     (y / self.cell_m + 0.5).floor() as i32 + self.half,

@@ -24,11 +24,11 @@ pub(crate) struct LikelihoodGrid {
 }
 
 impl LikelihoodGrid {
-    /// An empty grid that reaches `radius_m` from `centre`.
-    pub fn around(centre: &Point2, radius_m: f64, cell_m: f64) -> Self {
+    /// An empty grid that reaches `radius_m` from `center`.
+    pub fn around(center: &Point2, radius_m: f64, cell_m: f64) -> Self {
         let side = (2.0 * radius_m / cell_m).ceil() as i32 + 4;
         let half = f64::from(side) * cell_m * 0.5;
-        let origin = Point2::new(centre.x - half, centre.y - half);
+        let origin = Point2::new(center.x - half, center.y - half);
         Self { cell_m, origin, side, cells: vec![0; (side * side) as usize], reach_m: radius_m }
     }
 

@@ -45,11 +45,11 @@ struct RecentScan {
 
 impl RecentScan {
     fn new(travel_mm: u64, run_from_robot: &Pose2, points: &[Point2]) -> Self {
-        let grains = |metres: f64| (metres / POINT_GRAIN_M).round() as i32;
+        let grains = |meters: f64| (meters / POINT_GRAIN_M).round() as i32;
         let robot_grains = (grains(run_from_robot.x), grains(run_from_robot.y));
         let offset = |point: Point2| {
             let along =
-                |metres: f64, robot: i32| grains(metres).saturating_sub(robot).clamp(-32_768, 32_767) as i16;
+                |meters: f64, robot: i32| grains(meters).saturating_sub(robot).clamp(-32_768, 32_767) as i16;
             (along(point.x, robot_grains.0), along(point.y, robot_grains.1))
         };
         let offsets = transformed(points, run_from_robot).into_iter().map(offset).collect();
@@ -58,9 +58,9 @@ impl RecentScan {
 
     /// The points in the run's frame, metres.
     fn points(&self) -> impl Iterator<Item = Point2> + '_ {
-        let metres = |robot: i32, offset: i16| f64::from(robot.saturating_add(offset.into())) * POINT_GRAIN_M;
+        let meters = |robot: i32, offset: i16| f64::from(robot.saturating_add(offset.into())) * POINT_GRAIN_M;
         let (x, y) = self.robot_grains;
-        self.offsets.iter().map(move |&(dx, dy)| Point2::new(metres(x, dx), metres(y, dy)))
+        self.offsets.iter().map(move |&(dx, dy)| Point2::new(meters(x, dx), meters(y, dy)))
     }
 }
 

@@ -143,10 +143,10 @@ impl SurfaceMap {
         // The axis of the larger variance runs at half this angle; the normal stands across it.
         let along = 0.5 * (2.0 * cxy).atan2(cxx - cyy);
         let (sin, cos) = along.sin_cos();
-        let centre_x = (f64::from(column) + 0.5) * self.cell_m;
-        let centre_y = (f64::from(row) + 0.5) * self.cell_m;
+        let center_x = (f64::from(column) + 0.5) * self.cell_m;
+        let center_y = (f64::from(row) + 0.5) * self.cell_m;
         Some(Surface {
-            mean: Point2::new(centre_x + mx * 1e-3, centre_y + my * 1e-3),
+            mean: Point2::new(center_x + mx * 1e-3, center_y + my * 1e-3),
             normal: Point2::new(-sin, cos),
             across_m2: (half_sum - half_gap).max(0.0) * 1e-6,
             along_m2: (half_sum + half_gap) * 1e-6,

@@ -232,14 +232,14 @@ mod tests {
     use super::*;
 
     /// Densities of a winding imaginary corridor at a distance from its beginning.
-    fn densities_at(metre: f64) -> Vec<f32> {
+    fn densities_at(meter: f64) -> Vec<f32> {
         let wave =
-            |rate: f64, phase: f64| 0.5 + 0.4 * (metre * rate + phase + (metre * 0.31).sin() * 2.0).sin();
+            |rate: f64, phase: f64| 0.5 + 0.4 * (meter * rate + phase + (meter * 0.31).sin() * 2.0).sin();
         vec![wave(0.9, 0.0) as f32, wave(0.55, 1.0) as f32, wave(0.27, 2.0) as f32]
     }
 
-    fn profile(metres: impl Iterator<Item = f64>) -> RunProfile {
-        let densities: Vec<Vec<f32>> = metres.map(densities_at).collect();
+    fn profile(meters: impl Iterator<Item = f64>) -> RunProfile {
+        let densities: Vec<Vec<f32>> = meters.map(densities_at).collect();
         RunProfile::from_observations(&run_of(&densities, 0.1), 0.25)
     }
 

@@ -93,7 +93,7 @@ impl<'a> BlockEvidence<'a> {
         let resolution_m = self.config.resolution_m;
         let reach = (radius_m / resolution_m).ceil() as i64;
         // Whole cells around the robot's own: adding metres would skip a row of cells when it stands on a border.
-        let cell = |metres: f64| (metres / resolution_m + BORDER_SHARE).floor() as i64;
+        let cell = |meters: f64| (meters / resolution_m + BORDER_SHARE).floor() as i64;
         let (column, row) = (cell(position.x - self.lower_left.x), cell(position.y - self.lower_left.y));
         let side = self.side as i64;
         for (up, right) in (-reach..=reach).flat_map(|up| (-reach..=reach).map(move |right| (up, right))) {
@@ -186,16 +186,16 @@ fn fill_specks(is_free: &mut [bool], side: usize, max_cells: usize) {
         while let Some(&index) = group.get(next) {
             next += 1;
             let (column, row) = (index % side, index / side);
-            let neighbours = [
+            let neighbors = [
                 (column > 0).then(|| index - 1),
                 (column + 1 < side).then_some(index + 1),
                 (row > 0).then(|| index - side),
                 (row + 1 < side).then_some(index + side),
             ];
-            for neighbour in neighbours.into_iter().flatten() {
-                if !is_free[neighbour] && !is_done[neighbour] {
-                    is_done[neighbour] = true;
-                    group.push(neighbour);
+            for neighbor in neighbors.into_iter().flatten() {
+                if !is_free[neighbor] && !is_done[neighbor] {
+                    is_done[neighbor] = true;
+                    group.push(neighbor);
                 }
             }
         }

@@ -51,8 +51,8 @@ impl Flood {
         }
     }
 
-    fn units(metres: f64, block: &Block) -> u16 {
-        (metres / block.resolution_m * f64::from(EDGE_STEP)).clamp(0.0, 30_000.0) as u16
+    fn units(meters: f64, block: &Block) -> u16 {
+        (meters / block.resolution_m * f64::from(EDGE_STEP)).clamp(0.0, 30_000.0) as u16
     }
 
     /// Floods the cells that are open from `start` as far as `limit_m` (Dial's algorithm).
@@ -81,11 +81,11 @@ impl Flood {
                     continue;
                 }
                 self.reached.push(index);
-                for (neighbour, step) in neighbours(index as usize, block.side) {
+                for (neighbor, step) in neighbors(index as usize, block.side) {
                     let distance = current + step;
-                    if distance <= limit && distance < self.distance[neighbour] && is_open(neighbour) {
-                        self.distance[neighbour] = distance;
-                        self.buckets[usize::from(distance) % NUM_BUCKETS].push(neighbour as u32);
+                    if distance <= limit && distance < self.distance[neighbor] && is_open(neighbor) {
+                        self.distance[neighbor] = distance;
+                        self.buckets[usize::from(distance) % NUM_BUCKETS].push(neighbor as u32);
                         num_waiting += 1;
                     }
                 }
@@ -113,10 +113,10 @@ impl Flood {
             let mut next = 0;
             while let Some(&index) = group.get(next) {
                 next += 1;
-                for (neighbour, _) in neighbours(index, block.side) {
-                    if (near..=far).contains(&self.distance[neighbour]) && !self.is_grouped[neighbour] {
-                        self.is_grouped[neighbour] = true;
-                        group.push(neighbour);
+                for (neighbor, _) in neighbors(index, block.side) {
+                    if (near..=far).contains(&self.distance[neighbor]) && !self.is_grouped[neighbor] {
+                        self.is_grouped[neighbor] = true;
+                        group.push(neighbor);
                     }
                 }
             }
@@ -153,7 +153,7 @@ impl Flood {
 }
 
 /// The neighbours of a cell and the length of the step to each.
-fn neighbours(index: usize, side: usize) -> impl Iterator<Item = (usize, u16)> {
+fn neighbors(index: usize, side: usize) -> impl Iterator<Item = (usize, u16)> {
     let (column, row) = ((index % side) as i64, (index / side) as i64);
     const STEPS: [(i64, i64, u16); 8] = [
         (-1, -1, CORNER_STEP),

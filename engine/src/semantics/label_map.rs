@@ -49,7 +49,7 @@ impl<'a> DrivenRun<'a> {
 
 /// Labels of the observations of one run.
 #[derive(Clone, Debug, PartialEq)]
-pub struct LabelledRun {
+pub struct LabeledRun {
     /// A label for each observation.
     pub labels: Vec<PlaceLabel>,
     /// The share of what was seen nearby that agrees with the label, in [0, 1].
@@ -70,12 +70,12 @@ struct Sample {
 /// Labels every observation of runs that share one map frame.
 ///
 /// The label belongs to the place: it is decided by what all runs saw around it and by where any of them drove.
-pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<LabelledRun> {
+pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<LabeledRun> {
     let samples: Vec<Sample> =
         runs.iter().enumerate().flat_map(|(run_idx, run)| samples_of(config, run_idx, run)).collect();
     let mut blocks: BTreeMap<(i64, i64), Vec<Sample>> = BTreeMap::new();
     for sample in samples {
-        let key = |metres: f64| (metres / config.block_m).floor() as i64;
+        let key = |meters: f64| (meters / config.block_m).floor() as i64;
         blocks.entry((key(sample.position.x), key(sample.position.y))).or_default().push(sample);
     }
     let blocks: Vec<Vec<Sample>> = blocks.into_values().collect();
@@ -159,7 +159,7 @@ fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Samp
     let (right, top) = (highest(|p| p.x), highest(|p| p.y));
     let margin_m = config.margin_m();
     // Whole cells, so that the same place falls into the same cells whatever else is in its block.
-    let snap = |metres: f64| (metres / config.resolution_m).floor() * config.resolution_m;
+    let snap = |meters: f64| (meters / config.resolution_m).floor() * config.resolution_m;
     let lower_left = Point2::new(snap(left - margin_m), snap(bottom - margin_m));
     let edge_m = (right - left).max(top - bottom) + 2.0 * margin_m + config.resolution_m;
     let mut evidence = BlockEvidence::new(config, lower_left, edge_m);
@@ -189,7 +189,7 @@ fn label_run(
     config: &SemanticsConfig,
     run: &DrivenRun<'_>,
     signatures: Vec<(usize, PlaceSignature)>,
-) -> LabelledRun {
+) -> LabeledRun {
     let raw: Vec<PlaceLabel> = signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
     let reach = (config.smoothing_m / config.spacing_m).round() as usize;
     let smooth: Vec<(PlaceLabel, f32)> = (0..raw.len()).map(|at| majority(&raw, at, reach)).collect();
@@ -206,7 +206,7 @@ fn label_run(
         labels.push(label);
         confidences.push(confidence);
     }
-    LabelledRun { labels, confidences, signatures }
+    LabeledRun { labels, confidences, signatures }
 }
 
 /// The most frequent label within `reach` positions and its share; of equals the one in the middle, else the first.

@@ -29,7 +29,7 @@ mod tests;
 pub use config::SemanticsConfig;
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};
 pub use label::PlaceLabel;
-pub use label_map::{DrivenRun, LabelledRun, label_runs};
+pub use label_map::{DrivenRun, LabeledRun, label_runs};
 pub use pattern::{PatternMatch, PlacePattern, find_pattern};
 pub use places::{Place, PlaceMap, Spot, Visit};
 pub use route::{Route, RouteStep, Turn, route};

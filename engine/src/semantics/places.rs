@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::SemanticsConfig;
 use super::label::PlaceLabel;
-use super::label_map::{DrivenRun, LabelledRun};
+use super::label_map::{DrivenRun, LabeledRun};
 use super::outline::outline;
 use crate::geometry::{Point2, Pose2, wrap_angle};
 use crate::text::Interval;
@@ -21,7 +21,7 @@ pub struct Place {
     /// Border of the ground that was driven, counter-clockwise, metres, closed implicitly.
     pub outline: Vec<Point2>,
     /// Mean of the positions observed in it.
-    pub centre: Point2,
+    pub center: Point2,
     /// Length of the longest pass through it, metres.
     pub length_m: f64,
     /// Stretches of driving in it.
@@ -51,7 +51,7 @@ pub struct Spot {
     /// The place it belongs to.
     pub place: u32,
     /// Spots that can be reached at once, ascending.
-    pub neighbours: Vec<u32>,
+    pub neighbors: Vec<u32>,
 }
 
 /// All places of one component of a map.
@@ -90,13 +90,13 @@ impl Ground {
 
 impl PlaceMap {
     /// Gathers the labels of all runs of a component into places.
-    pub fn build(config: &SemanticsConfig, runs: &[DrivenRun<'_>], labelled: &[LabelledRun]) -> Self {
+    pub fn build(config: &SemanticsConfig, runs: &[DrivenRun<'_>], labeled: &[LabeledRun]) -> Self {
         let key = |pose: &Pose2| -> Key {
             ((pose.x / config.place_cell_m).floor() as i64, (pose.y / config.place_cell_m).floor() as i64)
         };
         let mut grounds: BTreeMap<Key, Ground> = BTreeMap::new();
         let mut steps: BTreeSet<(Key, Key)> = BTreeSet::new();
-        for (run, labels) in runs.iter().zip(labelled) {
+        for (run, labels) in runs.iter().zip(labeled) {
             let mut last: Option<Key> = None;
             for (pose, (label, confidence)) in
                 run.map_from_observations.iter().zip(labels.labels.iter().zip(&labels.confidences))
@@ -151,9 +151,9 @@ fn settled_labels(config: &SemanticsConfig, grounds: &BTreeMap<Key, Ground>) -> 
     for cells in members.values().filter(|cells| cells.len() < config.place_cells_min) {
         let mut touched = [0usize; 5];
         for cell in cells {
-            for neighbour in around(*cell) {
-                if let Some(label) = labels.get(&neighbour)
-                    && !cells.contains(&neighbour)
+            for neighbor in around(*cell) {
+                if let Some(label) = labels.get(&neighbor)
+                    && !cells.contains(&neighbor)
                 {
                     touched[label.index()] += 1;
                 }
@@ -180,10 +180,10 @@ fn connected(labels: &BTreeMap<Key, PlaceLabel>) -> BTreeMap<Key, u32> {
         groups.insert(*start, num_groups);
         let mut waiting = vec![*start];
         while let Some(cell) = waiting.pop() {
-            for neighbour in around(cell) {
-                if labels.get(&neighbour) == Some(label) && !groups.contains_key(&neighbour) {
-                    groups.insert(neighbour, num_groups);
-                    waiting.push(neighbour);
+            for neighbor in around(cell) {
+                if labels.get(&neighbor) == Some(label) && !groups.contains_key(&neighbor) {
+                    groups.insert(neighbor, num_groups);
+                    waiting.push(neighbor);
                 }
             }
         }
@@ -211,12 +211,12 @@ fn spots(
         .map(|(key, ground)| {
             let driven = steps.range((*key, (i64::MIN, i64::MIN))..=(*key, (i64::MAX, i64::MAX)));
             let reached = driven.map(|(_, to)| *to).chain(around(*key));
-            let neighbours: BTreeSet<u32> = reached.filter_map(|to| number.get(&to).copied()).collect();
+            let neighbors: BTreeSet<u32> = reached.filter_map(|to| number.get(&to).copied()).collect();
             let share = 1.0 / ground.num_observations.max(1) as f64;
             Spot {
                 position: Point2::new(ground.sum.x * share, ground.sum.y * share),
                 place: groups[key],
-                neighbours: neighbours.into_iter().collect(),
+                neighbors: neighbors.into_iter().collect(),
             }
         })
         .collect()
@@ -290,7 +290,7 @@ fn describe(
                 label,
                 confidence: agreeing / votes.max(f32::MIN_POSITIVE),
                 outline: outline(cells, config.place_cell_m),
-                centre: Point2::new(sum.x / num.max(1) as f64, sum.y / num.max(1) as f64),
+                center: Point2::new(sum.x / num.max(1) as f64, sum.y / num.max(1) as f64),
                 length_m: 0.0,
                 visits: Vec::new(),
                 connections: Vec::new(),

@@ -104,7 +104,7 @@ pub fn route(map: &PlaceMap, from: &Point2, to: &Point2, reach_m: f64) -> Option
 }
 
 fn phrase(label: PlaceLabel, length_m: f64, turn: Turn, is_start: bool, is_end: bool) -> String {
-    let metres = length_m.round().max(1.0);
+    let meters = length_m.round().max(1.0);
     let way = match turn {
         Turn::Straight => "straight on",
         Turn::Left => "left",
@@ -112,11 +112,11 @@ fn phrase(label: PlaceLabel, length_m: f64, turn: Turn, is_start: bool, is_end: 
         Turn::Back => "back",
     };
     match label {
-        PlaceLabel::Corridor => format!("along the corridor {metres} m"),
-        PlaceLabel::Hall if !is_end => format!("{way} through the hall {metres} m"),
+        PlaceLabel::Corridor => format!("along the corridor {meters} m"),
+        PlaceLabel::Hall if !is_end => format!("{way} through the hall {meters} m"),
         PlaceLabel::DeadEnd if is_end => "into the room".into(),
         PlaceLabel::DeadEnd if is_start => "out of the room".into(),
-        PlaceLabel::DeadEnd => format!("through the room {metres} m"),
+        PlaceLabel::DeadEnd => format!("through the room {meters} m"),
         _ if is_end => format!("to the {label}"),
         _ if is_start => format!("from the {label}"),
         _ => format!("{way} at the {label}"),
@@ -143,7 +143,7 @@ fn shortest_path(map: &PlaceMap, start: usize, goal: usize) -> Option<Vec<usize>
         if so_far > best[spot] {
             continue;
         }
-        for &next in &map.spots[spot].neighbours {
+        for &next in &map.spots[spot].neighbors {
             let next = next as usize;
             let step_m = map.spots[spot].position.distance(&map.spots[next].position);
             let total = so_far + (step_m * 1e4) as u64;

@@ -43,7 +43,7 @@ impl<'a> SignatureReader<'a> {
     pub(super) fn read(&mut self, at: usize, turn_rad: f64) -> PlaceSignature {
         let (config, block) = (self.config, self.block);
         let half_width_m = self.half_width_m(at);
-        let clearance = |metres: f64| metres as f32;
+        let clearance = |meters: f64| meters as f32;
 
         // Openings of doors are passages here, if they go on behind the door.
         let (door, wide) = (clearance(config.door_half_width_m), clearance(config.bend_half_width_m));
@@ -86,11 +86,11 @@ impl<'a> SignatureReader<'a> {
         let config = self.config;
         let reach = (config.hall_radius_m * 2.0 * config.hall_core_share / self.block.resolution_m) as usize;
         let mut largest = 0.0f64;
-        for centre in self.block.square(at, reach).step_by(2) {
-            let radius_m = f64::from(self.block.clearance_m[centre]);
+        for center in self.block.square(at, reach).step_by(2) {
+            let radius_m = f64::from(self.block.clearance_m[center]);
             if radius_m >= config.hall_radius_m
                 && radius_m > largest
-                && self.block.distance_m(at, centre) <= config.hall_core_share * radius_m
+                && self.block.distance_m(at, center) <= config.hall_core_share * radius_m
             {
                 largest = radius_m;
             }

@@ -54,22 +54,22 @@ fn drive(corners: &[(f64, f64)]) -> Vec<Pose2> {
     poses
 }
 
-struct Labelled {
+struct Labeled {
     poses: Vec<Pose2>,
-    runs: Vec<LabelledRun>,
+    runs: Vec<LabeledRun>,
     map: PlaceMap,
 }
 
-impl Labelled {
+impl Labeled {
     fn new(building: &Building, corners: &[(f64, f64)]) -> Self {
         let (geometry, poses, config) = (geometry(), drive(corners), SemanticsConfig::default());
         let ranges: Vec<Vec<f32>> =
             poses.iter().step_by(2).map(|pose| building.scan(&geometry, pose)).collect();
         let scans = poses.iter().step_by(2).copied().zip(ranges.iter().map(Vec::as_slice)).collect();
         let runs = [DrivenRun { geometry: &geometry, scans, map_from_observations: poses.clone() }];
-        let labelled = label_runs(&config, &runs);
-        let map = PlaceMap::build(&config, &runs, &labelled);
-        Self { poses, runs: labelled, map }
+        let labeled = label_runs(&config, &runs);
+        let map = PlaceMap::build(&config, &runs, &labeled);
+        Self { poses, runs: labeled, map }
     }
 
     fn label_at(&self, x: f64, y: f64) -> PlaceLabel {
@@ -81,9 +81,9 @@ impl Labelled {
 }
 
 /// A corridor east, a right angle, and a corridor north; both 2 m wide.
-fn angle() -> Labelled {
+fn angle() -> Labeled {
     let building = Building(vec![(0.0, 0.0, 22.0, 2.0), (20.0, 0.0, 22.0, 22.0)]);
-    Labelled::new(&building, &[(1.0, 1.0), (21.0, 1.0), (21.0, 21.0)])
+    Labeled::new(&building, &[(1.0, 1.0), (21.0, 1.0), (21.0, 21.0)])
 }
 
 #[test]
@@ -98,10 +98,10 @@ fn an_angle_is_a_corner_between_corridors() {
 #[test]
 fn a_side_passage_makes_a_bifurcation_and_a_niche_does_not() {
     let building = Building(vec![(0.0, 0.0, 40.0, 2.0), (13.0, 0.0, 15.0, 16.0), (27.0, 0.0, 29.0, 4.0)]);
-    let labelled = Labelled::new(&building, &[(1.0, 1.0), (39.0, 1.0)]);
-    assert_eq!(labelled.label_at(14.0, 1.0), PlaceLabel::Bifurcation);
-    assert_eq!(labelled.label_at(28.0, 1.0), PlaceLabel::Corridor);
-    assert_eq!(labelled.label_at(21.0, 1.0), PlaceLabel::Corridor);
+    let labeled = Labeled::new(&building, &[(1.0, 1.0), (39.0, 1.0)]);
+    assert_eq!(labeled.label_at(14.0, 1.0), PlaceLabel::Bifurcation);
+    assert_eq!(labeled.label_at(28.0, 1.0), PlaceLabel::Corridor);
+    assert_eq!(labeled.label_at(21.0, 1.0), PlaceLabel::Corridor);
 }
 
 #[test]
@@ -114,10 +114,10 @@ fn a_visited_room_is_a_dead_end_and_a_large_one_on_the_way_a_hall() {
         (29.8, 0.0, 45.0, 2.0),
     ]);
     let way = [(1.0, 1.0), (10.0, 1.0), (10.0, 5.0), (10.0, 1.0), (44.0, 1.0)];
-    let labelled = Labelled::new(&building, &way);
-    assert_eq!(labelled.label_at(10.0, 4.5), PlaceLabel::DeadEnd);
-    assert_eq!(labelled.label_at(25.0, 1.0), PlaceLabel::Hall);
-    assert_eq!(labelled.label_at(38.0, 1.0), PlaceLabel::Corridor);
+    let labeled = Labeled::new(&building, &way);
+    assert_eq!(labeled.label_at(10.0, 4.5), PlaceLabel::DeadEnd);
+    assert_eq!(labeled.label_at(25.0, 1.0), PlaceLabel::Hall);
+    assert_eq!(labeled.label_at(38.0, 1.0), PlaceLabel::Corridor);
 }
 
 #[test]
@@ -149,20 +149,20 @@ fn patterns_fit_driving_either_way() {
 }
 
 #[test]
-fn places_know_their_neighbours_and_their_ground() {
+fn places_know_their_neighbors_and_their_ground() {
     let map = angle().map;
     let corner = map.places.iter().position(|place| place.label == PlaceLabel::Corner).expect("a corner");
     let place = &map.places[corner];
     assert_eq!(place.connections.len(), 2);
     assert!(place.confidence > 0.5 && place.outline.len() >= 4 && !place.visits.is_empty());
-    assert!(place.centre.distance(&Point2::new(21.0, 1.0)) < 2.0);
+    assert!(place.center.distance(&Point2::new(21.0, 1.0)) < 2.0);
 }
 
 #[test]
 fn nothing_driven_gives_nothing() {
     let geometry = geometry();
     let runs = [DrivenRun { geometry: &geometry, scans: Vec::new(), map_from_observations: Vec::new() }];
-    let labelled = label_runs(&SemanticsConfig::default(), &runs);
-    assert!(labelled[0].labels.is_empty());
-    assert_eq!(PlaceMap::build(&SemanticsConfig::default(), &runs, &labelled).places.len(), 0);
+    let labeled = label_runs(&SemanticsConfig::default(), &runs);
+    assert!(labeled[0].labels.is_empty());
+    assert_eq!(PlaceMap::build(&SemanticsConfig::default(), &runs, &labeled).places.len(), 0);
 }

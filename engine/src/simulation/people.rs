@@ -70,6 +70,6 @@ impl People {
 
     /// Where everybody is.
     pub(super) fn discs(&self) -> Vec<Disc> {
-        self.walkers.iter().map(|walker| Disc { centre: walker.position, radius_m: self.radius_m }).collect()
+        self.walkers.iter().map(|walker| Disc { center: walker.position, radius_m: self.radius_m }).collect()
     }
 }

@@ -66,11 +66,11 @@ impl Planner {
         let mut planner =
             Self { width, height, cell_m, origin: world.origin(), clearance_m: Vec::new(), robot_radius_m };
         planner.clearance_m =
-            (0..width * height).map(|cell| world.clearance_m(&planner.centre(cell)) as f32).collect();
+            (0..width * height).map(|cell| world.clearance_m(&planner.center(cell)) as f32).collect();
         planner
     }
 
-    pub(super) fn centre(&self, cell: usize) -> Point2 {
+    pub(super) fn center(&self, cell: usize) -> Point2 {
         let along = |from: f64, cells: usize| from + (cells as f64 + 0.5) * self.cell_m;
         Point2::new(along(self.origin.x, cell % self.width), along(self.origin.y, cell / self.width))
     }
@@ -87,7 +87,7 @@ impl Planner {
                 (column < self.width && row < self.height).then_some(row * self.width + column)
             })
             .filter(|&cell| self.fits(cell))
-            .map(|cell| (self.centre(cell).distance(point), cell))
+            .map(|cell| (self.center(cell).distance(point), cell))
             .min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)))
             .map(|(_, cell)| cell)
             .ok_or(PlanError::Blocked { x: point.x, y: point.y })
@@ -120,28 +120,28 @@ impl Planner {
             if f32::from_bits(bits) > cost[cell] {
                 continue;
             }
-            for (neighbour, length_m) in self.neighbours(cell) {
-                let crowding = (1.0 - f64::from(self.clearance_m[neighbour]) / comfort_m).max(0.0);
+            for (neighbor, length_m) in self.neighbors(cell) {
+                let crowding = (1.0 - f64::from(self.clearance_m[neighbor]) / comfort_m).max(0.0);
                 let reached = cost[cell] + (length_m * (1.0 + 3.0 * crowding)) as f32;
-                if reached < cost[neighbour] {
-                    cost[neighbour] = reached;
-                    parent[neighbour] = cell as u32;
-                    queue.push(Reverse((reached.to_bits(), neighbour as u32)));
+                if reached < cost[neighbor] {
+                    cost[neighbor] = reached;
+                    parent[neighbor] = cell as u32;
+                    queue.push(Reverse((reached.to_bits(), neighbor as u32)));
                 }
             }
         }
         Ok(WaysFrom { start: *start, parent })
     }
 
-    fn neighbours(&self, cell: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
+    fn neighbors(&self, cell: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (column, row) = ((cell % self.width) as i64, (cell / self.width) as i64);
         let around = (-1..=1i64).flat_map(|dy| (-1..=1i64).map(move |dx| (dx, dy)));
         around.filter(|&step| step != (0, 0)).filter_map(move |(dx, dy)| {
             let (column, row) = (usize::try_from(column + dx).ok()?, usize::try_from(row + dy).ok()?);
-            let neighbour = row * self.width + column;
+            let neighbor = row * self.width + column;
             let exists = column < self.width && row < self.height;
-            (exists && self.fits(neighbour))
-                .then(|| (neighbour, self.cell_m * ((dx * dx + dy * dy) as f64).sqrt()))
+            (exists && self.fits(neighbor))
+                .then(|| (neighbor, self.cell_m * ((dx * dx + dy * dy) as f64).sqrt()))
         })
     }
 
@@ -155,10 +155,10 @@ impl Planner {
             let Point2 { x: from_x, y: from_y } = ways.start;
             return Err(PlanError::Unreachable { from_x, from_y, x: goal.x, y: goal.y });
         }
-        let mut way = vec![self.centre(cell)];
+        let mut way = vec![self.center(cell)];
         while ways.parent[cell] as usize != cell {
             cell = ways.parent[cell] as usize;
-            way.push(self.centre(cell));
+            way.push(self.center(cell));
         }
         way.reverse();
         Ok(way)

@@ -8,7 +8,7 @@ use crate::scan::ScanGeometry;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Centre in the world's frame.
-    pub centre: Point2,
+    pub center: Point2,
     /// Radius in metres.
     pub radius_m: f64,
 }
@@ -25,7 +25,7 @@ pub(super) fn cast_scan(
     let near: Vec<Disc> = discs
         .iter()
         .filter(|disc| {
-            let distance_m = disc.centre.distance(&origin);
+            let distance_m = disc.center.distance(&origin);
             // A laser inside a person would see nothing at all; such a person has stepped aside.
             distance_m > disc.radius_m + 0.05 && distance_m < geometry.range_max_m + disc.radius_m
         })
@@ -87,7 +87,7 @@ fn exit_m(from: f64, direction: f64, cell: i64, grid_origin: f64, resolution_m: 
 
 fn distance_to_disc(origin: &Point2, angle_rad: f64, disc: &Disc) -> Option<f64> {
     let (dy, dx) = angle_rad.sin_cos();
-    let (cx, cy) = (disc.centre.x - origin.x, disc.centre.y - origin.y);
+    let (cx, cy) = (disc.center.x - origin.x, disc.center.y - origin.y);
     let along_m = cx * dx + cy * dy;
     let aside_m = cx * dy - cy * dx;
     let half_chord_squared = disc.radius_m * disc.radius_m - aside_m * aside_m;
@@ -148,12 +148,12 @@ mod tests {
             robot_from_laser: Pose2::new(0.5, 0.0, 0.0),
         };
         let robot = Pose2::new(1.5, 0.75, 0.0);
-        let person = Disc { centre: Point2::new(2.0, 2.0), radius_m: 0.25 };
+        let person = Disc { center: Point2::new(2.0, 2.0), radius_m: 0.25 };
         let ranges = cast_scan(&world, &[person], &geometry, &robot);
         assert!((ranges[0] - 0.25).abs() < 1e-9, "{ranges:?}");
         assert!(ranges[1].is_infinite(), "{ranges:?}");
         assert!((ranges[2] - 1.0).abs() < 1e-9, "{ranges:?}");
-        let upon_the_laser = Disc { centre: Point2::new(2.0, 0.85), radius_m: 0.25 };
+        let upon_the_laser = Disc { center: Point2::new(2.0, 0.85), radius_m: 0.25 };
         assert!((cast_scan(&world, &[upon_the_laser], &geometry, &robot)[2] - 1.75).abs() < 1e-9);
     }
 }

@@ -200,7 +200,7 @@ impl Driver<'_> {
             if cells.is_empty() {
                 break;
             }
-            let place = self.planner.centre(cells[rng.random_range(0..cells.len())]);
+            let place = self.planner.center(cells[rng.random_range(0..cells.len())]);
             let ways = self.planner.ways_from(&place, self.config.drive.comfort_m)?;
             // A pocket between two pieces of furniture is no place to start from.
             if cells.iter().filter(|&&cell| ways.reaches(cell)).count() * 4 > cells.len() {
@@ -222,7 +222,7 @@ impl Driver<'_> {
             .planner
             .standing_cells()
             .into_iter()
-            .filter(|&cell| ways.reaches(cell) && self.planner.centre(cell).distance(here) > 5.0)
+            .filter(|&cell| ways.reaches(cell) && self.planner.center(cell).distance(here) > 5.0)
             .collect();
         if reachable.is_empty() {
             return None;
@@ -231,7 +231,7 @@ impl Driver<'_> {
             poses.iter().step_by(10).filter(|pose| pose.position().distance(place) < 3.0).count()
         };
         (0..5)
-            .map(|_| self.planner.centre(reachable[rng.random_range(0..reachable.len())]))
+            .map(|_| self.planner.center(reachable[rng.random_range(0..reachable.len())]))
             .min_by_key(visits)
     }
 
@@ -242,7 +242,7 @@ impl Driver<'_> {
         }
         let ways = self.planner.ways_from(&start.position(), self.config.drive.comfort_m)?;
         let cells = self.planner.standing_cells().into_iter();
-        Ok(cells.filter(|&cell| ways.reaches(cell)).map(|cell| self.planner.centre(cell)).collect())
+        Ok(cells.filter(|&cell| ways.reaches(cell)).map(|cell| self.planner.center(cell)).collect())
     }
 }
 

@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rare_mode_joins_its_nearer_neighbour() {
+    fn a_rare_mode_joins_its_nearer_neighbor() {
         let quantizer = Quantizer::mean_shift(&histogram_of(&[(0.3, 500), (0.6, 3), (0.8, 500)]), 0.03, 0.01);
         assert_eq!(quantizer.num_classes(), 2);
         assert_eq!([0.3, 0.6, 0.8].map(|density| quantizer.class_of(density)), [0, 1, 1]);

@@ -12,7 +12,7 @@ use locution_engine::mapping::{
 use locution_engine::text::{Observation, Word};
 
 use super::jobs::{JobKind, Progress};
-use super::labels::{LabelledMap, label_map};
+use super::labels::{LabeledMap, label_map};
 use super::maps::WrittenRun;
 use super::matches::holds_for;
 use super::reading::{read_keyframes, read_observations, read_words};
@@ -152,11 +152,11 @@ async fn map_runs(
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
-) -> Result<(SiteMap, LabelledMap), AppError> {
+) -> Result<(SiteMap, LabeledMap), AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
-        let labels = LabelledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+        let labels = LabeledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
         return Ok((map, labels));
     }
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{RunRecord, SiteMap};
-use locution_engine::semantics::{DrivenRun, LabelledRun, PlaceLabel, PlaceMap, SemanticsConfig, label_runs};
+use locution_engine::semantics::{DrivenRun, LabeledRun, PlaceLabel, PlaceMap, SemanticsConfig, label_runs};
 use serde::{Deserialize, Serialize};
 
 use super::AppError;
@@ -26,7 +26,7 @@ pub struct StoredLabel {
 
 /// What the map builder stores of labels.
 #[derive(Clone, Debug, Default)]
-pub(super) struct LabelledMap {
+pub(super) struct LabeledMap {
     /// A label for every observation of every run, as its place has it.
     pub labels: Vec<Vec<StoredLabel>>,
     /// The places of each component.
@@ -34,31 +34,31 @@ pub(super) struct LabelledMap {
 }
 
 /// Labels of all observations of all runs, and the places that they make, component by component.
-pub(super) fn label_map(runs: &[RunRecord<'_>], map: &SiteMap, config: &SemanticsConfig) -> LabelledMap {
+pub(super) fn label_map(runs: &[RunRecord<'_>], map: &SiteMap, config: &SemanticsConfig) -> LabeledMap {
     let mut by_component: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
     for (run_idx, mapped) in map.runs.iter().enumerate().filter(|(_, run)| !run.map_from_keyframes.is_empty())
     {
         by_component.entry(mapped.component).or_default().push(run_idx);
     }
-    let mut labelled_map = LabelledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+    let mut labeled_map = LabeledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
     for (component, members) in &by_component {
         let driven: Vec<DrivenRun<'_>> = members
             .iter()
             .map(|&run_idx| DrivenRun::in_map(&runs[run_idx], &map.runs[run_idx].map_from_keyframes))
             .collect();
-        let labelled = label_runs(config, &driven);
-        let places = PlaceMap::build(config, &driven, &labelled);
-        for (member_idx, (&run_idx, labelled)) in members.iter().zip(&labelled).enumerate() {
-            labelled_map.labels[run_idx] = stored(&places.labels_of_run(member_idx), labelled);
+        let labeled = label_runs(config, &driven);
+        let places = PlaceMap::build(config, &driven, &labeled);
+        for (member_idx, (&run_idx, labeled)) in members.iter().zip(&labeled).enumerate() {
+            labeled_map.labels[run_idx] = stored(&places.labels_of_run(member_idx), labeled);
         }
-        labelled_map.places.push((*component, places));
+        labeled_map.places.push((*component, places));
     }
-    labelled_map
+    labeled_map
 }
 
 /// The labels of places, with what the single pass saw for or against its own.
-fn stored(labels: &[PlaceLabel], labelled: &LabelledRun) -> Vec<StoredLabel> {
-    let pairs = labels.iter().zip(&labelled.confidences);
+fn stored(labels: &[PlaceLabel], labeled: &LabeledRun) -> Vec<StoredLabel> {
+    let pairs = labels.iter().zip(&labeled.confidences);
     pairs
         .map(|(label, confidence)| StoredLabel { label_idx: label.index() as u8, confidence: *confidence })
         .collect()
@@ -66,7 +66,7 @@ fn stored(labels: &[PlaceLabel], labelled: &LabelledRun) -> Vec<StoredLabel> {
 
 /// A stretch of driving through places of one label.
 #[derive(Clone, Debug)]
-pub struct LabelledStretch {
+pub struct LabeledStretch {
     /// Name of the run.
     pub run: String,
     /// Component of the map.
@@ -103,7 +103,7 @@ pub struct LabelPattern {
 }
 
 impl LabelPattern {
-    fn accepts(&self, stretch: &LabelledStretch, is_reversed: bool) -> bool {
+    fn accepts(&self, stretch: &LabeledStretch, is_reversed: bool) -> bool {
         let turn_rad = if is_reversed { -stretch.turn_rad } else { stretch.turn_rad };
         stretch.label == self.label
             && (self.length_min_m..=self.length_max_m).contains(&stretch.length_m)
@@ -115,7 +115,7 @@ impl LabelPattern {
 #[derive(Clone, Debug)]
 pub struct LabelAnswer {
     /// The stretches, in the order of the question.
-    pub stretches: Vec<LabelledStretch>,
+    pub stretches: Vec<LabeledStretch>,
     /// Whether the run drove them the other way round.
     pub is_reversed: bool,
     /// The least sure of its labels.
@@ -131,7 +131,7 @@ impl Site {
         &self,
         map: &MapRecord,
         run: &MapRun,
-    ) -> Result<Vec<LabelledStretch>, AppError> {
+    ) -> Result<Vec<LabeledStretch>, AppError> {
         let labels = self.stored_labels(map, run).await?;
         let poses = self.map_poses(map, run).await?;
         let info = read_run(&**self.store(), self.generation(), run.run).await?;
@@ -145,7 +145,7 @@ impl Site {
             if let (Some(label), Some(driven)) = (label, observations.get(first..=last)) {
                 let (start, end) = (&driven[0], &driven[driven.len() - 1]);
                 let middle = pose_at(&poses, driven[driven.len() / 2].scan_seq);
-                stretches.push(LabelledStretch {
+                stretches.push(LabeledStretch {
                     run: run.name.clone(),
                     component: run.component,
                     label,
@@ -170,7 +170,7 @@ impl Site {
     ///
     /// # Errors
     /// Those of the storage.
-    pub async fn labels(&self, map: &MapRecord) -> Result<Vec<LabelledStretch>, AppError> {
+    pub async fn labels(&self, map: &MapRecord) -> Result<Vec<LabeledStretch>, AppError> {
         let mut labels = Vec::new();
         for run in map.runs.iter().filter(|run| run.num_labels > 0) {
             labels.extend(self.labels_of_run(map, run).await?);
@@ -212,8 +212,8 @@ impl Site {
 }
 
 /// Joins stretches of one label that only a short other one parts.
-fn without_flicker(stretches: Vec<LabelledStretch>) -> Vec<LabelledStretch> {
-    let mut joined: Vec<LabelledStretch> = Vec::new();
+fn without_flicker(stretches: Vec<LabeledStretch>) -> Vec<LabeledStretch> {
+    let mut joined: Vec<LabeledStretch> = Vec::new();
     for stretch in stretches {
         if stretch.length_m < FLICKER_M && !joined.is_empty() {
             continue;

@@ -7,7 +7,7 @@ use locution_engine::mapping::{PlaceMatch, SiteMap};
 use locution_engine::scan::Scan;
 use serde::{Deserialize, Serialize};
 
-use super::labels::{LabelledMap, StoredLabel};
+use super::labels::{LabeledMap, StoredLabel};
 use super::matches::StoredMatches;
 use super::places::append_places;
 use super::records::StoredRun;
@@ -191,7 +191,7 @@ impl Site {
     pub(super) async fn write_map(
         &self,
         map: &SiteMap,
-        labelled: &LabelledMap,
+        labeled: &LabeledMap,
         runs: &[WrittenRun],
         duration_s: f64,
     ) -> Result<MapRecord, AppError> {
@@ -208,7 +208,7 @@ impl Site {
         };
         let mut batch = Batch::default();
         let (mut first_pose, mut first_label) = (0, 0);
-        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(&labelled.labels) {
+        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(&labeled.labels) {
             let poses: Vec<MapPose> = written
                 .keyframe_seqs
                 .iter()
@@ -235,7 +235,7 @@ impl Site {
             first_label += labels.len() as u64;
             self.commit_when_large(&mut batch).await?;
         }
-        for (component, places) in &labelled.places {
+        for (component, places) in &labeled.places {
             append_places(&mut batch, version, *component, places)?;
             self.commit_when_large(&mut batch).await?;
         }

@@ -27,7 +27,7 @@ mod grids;
 mod ingest;
 mod jobs;
 pub mod labels;
-pub mod localisations;
+pub mod localizations;
 pub mod maps;
 pub mod matches;
 mod names;
@@ -57,7 +57,7 @@ pub use trajectory::{Frame, StampedPose, Trajectory};
 
 use examples::PlaceIndexes;
 use grids::GridKey;
-use localisations::Localisations;
+use localizations::Localizations;
 use open_runs::OpenRuns;
 
 /// Grids kept in memory; each has at most 64 million cells of one byte.
@@ -76,7 +76,7 @@ pub struct App {
     grids: Mutex<LruCache<GridKey, Arc<GridMap>>>,
     drawing: tokio::sync::Mutex<()>,
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
-    localisations: Localisations,
+    localizations: Localizations,
     place_indexes: PlaceIndexes,
 }
 
@@ -90,7 +90,7 @@ impl App {
             grids: Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             drawing: tokio::sync::Mutex::default(),
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
-            localisations: Localisations::default(),
+            localizations: Localizations::default(),
             place_indexes: PlaceIndexes::default(),
             config,
             storage,

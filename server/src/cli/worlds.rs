@@ -42,11 +42,11 @@ pub fn decode_picture(bytes: &[u8]) -> Result<GrayImage> {
     let frame = reader.next_frame(&mut buffer)?;
     let samples = frame.color_type.samples();
     // A last sample beside grey or colour is opacity and says nothing about walls.
-    let num_colours = if samples > 2 { 3 } else { 1 };
-    let grey = |pixel: &[u8]| {
-        (pixel[..num_colours].iter().map(|&value| u32::from(value)).sum::<u32>() / num_colours as u32) as u8
+    let num_colors = if samples > 2 { 3 } else { 1 };
+    let gray = |pixel: &[u8]| {
+        (pixel[..num_colors].iter().map(|&value| u32::from(value)).sum::<u32>() / num_colors as u32) as u8
     };
-    let pixels = buffer[..frame.buffer_size()].chunks_exact(samples).map(grey).collect();
+    let pixels = buffer[..frame.buffer_size()].chunks_exact(samples).map(gray).collect();
     Ok(GrayImage { width: frame.width as usize, height: frame.height as usize, pixels })
 }
 
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pictures_decode_to_grey() {
+    fn pictures_decode_to_gray() {
         let mut bytes = Vec::new();
         let mut encoder = png::Encoder::new(&mut bytes, 2, 1);
         encoder.set_color(png::ColorType::Rgba);

@@ -37,7 +37,8 @@ pub struct ChangeDto {
     /// Component of the map in whose frame the positions are.
     pub component: u32,
     /// Mean position of what changed.
-    pub centre: PointDto,
+    #[serde(rename = "centre")]
+    pub center: PointDto,
     /// Lower left corner of the rectangle around it.
     pub low: PointDto,
     /// Upper right corner.
@@ -60,7 +61,7 @@ impl ChangeDto {
         Self {
             kind: kind.into(),
             component,
-            centre: (&change.center).into(),
+            center: (&change.center).into(),
             low: (&change.low).into(),
             high: (&change.high).into(),
             area_m2: change.area_m2,

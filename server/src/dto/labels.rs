@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::labels::{LabelAnswer, LabelPattern, LabelledStretch};
+use crate::app::labels::{LabelAnswer, LabelPattern, LabeledStretch};
 use crate::error::ApiError;
 
 /// Most parts of a question.
@@ -52,8 +52,8 @@ pub struct LabelDto {
     pub map_from_middle: PoseDto,
 }
 
-impl From<LabelledStretch> for LabelDto {
-    fn from(stretch: LabelledStretch) -> Self {
+impl From<LabeledStretch> for LabelDto {
+    fn from(stretch: LabeledStretch) -> Self {
         Self {
             run: stretch.run,
             component: stretch.component,

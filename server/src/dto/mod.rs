@@ -5,7 +5,7 @@ pub mod changes;
 pub mod common;
 pub mod jobs;
 pub mod labels;
-pub mod localisations;
+pub mod localizations;
 pub mod maps;
 pub mod places;
 pub mod queries;

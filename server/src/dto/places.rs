@@ -31,7 +31,8 @@ pub struct PlaceDto {
     /// Share of the votes that agree, from 0 to 1.
     pub confidence: f32,
     /// Mean of the positions observed in it.
-    pub centre: PointDto,
+    #[serde(rename = "centre")]
+    pub center: PointDto,
     /// Metres of the longest pass through it.
     pub length_m: f64,
     /// Border of the ground that was driven, counter-clockwise.
@@ -45,7 +46,7 @@ impl PlaceDto {
             place,
             label: from.label.name().into(),
             confidence: from.confidence,
-            centre: (&from.centre).into(),
+            center: (&from.center).into(),
             length_m: from.length_m,
             outline: from.outline.iter().map(PointDto::from).collect(),
         }

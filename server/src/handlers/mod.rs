@@ -5,7 +5,7 @@ pub mod changes;
 pub mod encodings;
 pub mod jobs;
 pub mod labels;
-pub mod localisations;
+pub mod localizations;
 pub mod maps;
 pub mod matches;
 pub mod operations;

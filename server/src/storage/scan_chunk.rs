@@ -12,12 +12,12 @@
 //! ```
 
 /// Readings per metre of each unit; index 0 stands for plain floats.
-const UNITS_PER_METRE: [f64; 4] = [0.0, 100.0, 1000.0, 10_000.0];
+const UNITS_PER_METER: [f64; 4] = [0.0, 100.0, 1000.0, 10_000.0];
 
 /// Appends the packed form of one scan's readings; NaN means "no return".
 pub fn pack_ranges(ranges_m: &[f32], out: &mut Vec<u8>) {
     let start = out.len();
-    for unit in 1..UNITS_PER_METRE.len() {
+    for unit in 1..UNITS_PER_METER.len() {
         if pack_in_unit(ranges_m, unit, out) {
             return;
         }
@@ -42,7 +42,7 @@ pub fn unpack_ranges(bytes: &mut &[u8], num_ranges: usize) -> Option<Vec<f32>> {
         *bytes = rest;
         return Some(floats.as_chunks().0.iter().map(|four| f32::from_le_bytes(*four)).collect());
     }
-    let per_metre = *UNITS_PER_METRE.get(usize::from(unit))?;
+    let per_meter = *UNITS_PER_METER.get(usize::from(unit))?;
     let mut ranges_m = Vec::with_capacity(num_ranges);
     let mut previous = 0i64;
     for _ in 0..num_ranges {
@@ -52,14 +52,14 @@ pub fn unpack_ranges(bytes: &mut &[u8], num_ranges: usize) -> Option<Vec<f32>> {
             continue;
         }
         previous = previous.wrapping_add(unzigzag(code - 1));
-        ranges_m.push(multiple_to_metres(previous, per_metre));
+        ranges_m.push(multiple_to_meters(previous, per_meter));
     }
     Some(ranges_m)
 }
 
 /// False when some reading is not a multiple of the unit.
 fn pack_in_unit(ranges_m: &[f32], unit: usize, out: &mut Vec<u8>) -> bool {
-    let per_metre = UNITS_PER_METRE[unit];
+    let per_meter = UNITS_PER_METER[unit];
     out.push(unit as u8);
     let mut previous = 0i64;
     for &range_m in ranges_m {
@@ -68,9 +68,9 @@ fn pack_in_unit(ranges_m: &[f32], unit: usize, out: &mut Vec<u8>) -> bool {
             continue;
         }
         // The cast saturates, and a saturated multiple does not reproduce the reading.
-        let multiple = (f64::from(range_m) * per_metre).round() as i64;
+        let multiple = (f64::from(range_m) * per_meter).round() as i64;
         if multiple.unsigned_abs() > 1 << 40
-            || multiple_to_metres(multiple, per_metre).to_bits() != range_m.to_bits()
+            || multiple_to_meters(multiple, per_meter).to_bits() != range_m.to_bits()
         {
             return false;
         }
@@ -81,8 +81,8 @@ fn pack_in_unit(ranges_m: &[f32], unit: usize, out: &mut Vec<u8>) -> bool {
 }
 
 /// The float that a decimal number of metres is read as.
-fn multiple_to_metres(multiple: i64, per_metre: f64) -> f32 {
-    (multiple as f64 / per_metre) as f32
+fn multiple_to_meters(multiple: i64, per_meter: f64) -> f32 {
+    (multiple as f64 / per_meter) as f32
 }
 
 fn zigzag(value: i64) -> u64 {
@@ -134,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn centimetres_take_about_a_byte() {
+    fn centimeters_take_about_a_byte() {
         let ranges_m: Vec<f32> =
             (0..180).map(|i| format!("{:.2}", 2.0 + 0.01 * (i % 30) as f64).parse().unwrap()).collect();
         let (back, num_bytes) = there_and_back(&ranges_m);
@@ -149,9 +149,9 @@ mod tests {
         }
 
         #[test]
-        fn decimals_come_back_exactly(millimetres in proptest::collection::vec(0..90_000u32, 0..200)) {
+        fn decimals_come_back_exactly(millimeters in proptest::collection::vec(0..90_000u32, 0..200)) {
             let ranges_m: Vec<f32> =
-                millimetres.iter().map(|mm| format!("{}.{:03}", mm / 1000, mm % 1000).parse().unwrap()).collect();
+                millimeters.iter().map(|mm| format!("{}.{:03}", mm / 1000, mm % 1000).parse().unwrap()).collect();
             let (back, num_bytes) = there_and_back(&ranges_m);
             prop_assert_eq!(bits(&back), bits(&ranges_m));
             prop_assert!(num_bytes <= 1 + 3 * ranges_m.len());

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use locution_client::{Client, LabelledStretch};
-use locution_engine::evaluation::{LabelReport, LabelledObservation, judge_labels};
-use locution_engine::formats::LabelledPlaces;
+use locution_client::{Client, LabeledStretch};
+use locution_engine::evaluation::{LabelReport, LabeledObservation, judge_labels};
+use locution_engine::formats::LabeledPlaces;
 use locution_engine::geometry::Pose2;
 
 use super::local_server::{LocalServer, RecordingArguments, SITE, SentRecording, build_map};
@@ -31,7 +31,7 @@ pub struct LabelsArguments {
 }
 
 /// One observation of a run.
-struct Labelled {
+struct Labeled {
     travel_m: f64,
     actual: Option<String>,
     predicted: Option<String>,
@@ -49,15 +49,15 @@ pub(super) async fn run(arguments: &LabelsArguments) -> Result<()> {
     let mut runs = Vec::new();
     for (idx, sent) in sent.iter().enumerate() {
         let files = (arguments.truth[idx].as_path(), arguments.labels[idx].as_path());
-        runs.push(labelled_run(&server.client, sent, files, &stretches).await?);
+        runs.push(labeled_run(&server.client, sent, files, &stretches).await?);
     }
-    let judged: Vec<Vec<LabelledObservation<'_>>> = runs
+    let judged: Vec<Vec<LabeledObservation<'_>>> = runs
         .iter()
         .map(|run| {
-            let judged = run.iter().map(|labelled| LabelledObservation {
-                travel_m: labelled.travel_m,
-                actual: labelled.actual.as_deref(),
-                predicted: labelled.predicted.as_deref(),
+            let judged = run.iter().map(|labeled| LabeledObservation {
+                travel_m: labeled.travel_m,
+                actual: labeled.actual.as_deref(),
+                predicted: labeled.predicted.as_deref(),
             });
             judged.collect()
         })
@@ -70,22 +70,22 @@ pub(super) async fn run(arguments: &LabelsArguments) -> Result<()> {
     server.stop().await
 }
 
-async fn labelled_run(
+async fn labeled_run(
     client: &Client,
     sent: &SentRecording,
     (truth_path, labels_path): (&Path, &Path),
-    stretches: &[LabelledStretch],
-) -> Result<Vec<Labelled>> {
+    stretches: &[LabeledStretch],
+) -> Result<Vec<Labeled>> {
     let name = &sent.recording.name;
     let observations = client.observations(SITE, name).await?;
-    let places: LabelledPlaces =
+    let places: LabeledPlaces =
         serde_json::from_str(&read_text(labels_path)?).with_context(|| labels_path.display().to_string())?;
     let judged = judged_run(&sent.recording, &observations, &read_truth(truth_path)?, 0);
     let label_of = |pose: Option<Pose2>| places.label_at(&pose?.position()).map(str::to_owned);
-    let mut labelled: Vec<Labelled> = judged
+    let mut labeled: Vec<Labeled> = judged
         .visits
         .iter()
-        .map(|visit| Labelled {
+        .map(|visit| Labeled {
             travel_m: visit.travel_m,
             actual: label_of(visit.truth_from_robot),
             predicted: None,
@@ -93,11 +93,11 @@ async fn labelled_run(
         .collect();
     for stretch in stretches.iter().filter(|stretch| stretch.run == *name) {
         let (first, last) = (usize::try_from(stretch.first)?, usize::try_from(stretch.last)?);
-        for observation in labelled.iter_mut().take(last.saturating_add(1)).skip(first) {
+        for observation in labeled.iter_mut().take(last.saturating_add(1)).skip(first) {
             observation.predicted = Some(stretch.label.clone());
         }
     }
-    Ok(labelled)
+    Ok(labeled)
 }
 
 fn print_report(report: &LabelReport) {

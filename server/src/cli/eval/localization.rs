@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use locution_client::{Client, LocalisationState, NewRun, Scan};
+use locution_client::{Client, LocalizationState, NewRun, Scan};
 use locution_engine::evaluation::{
     LocalizationReport, LocalizationTrial, OdometryPose, TrialOutcome, join_truth, judge_localization,
 };
@@ -33,7 +33,7 @@ pub struct LocalizationArguments {
     trials: usize,
     /// A robot that is not sure after driving this far, in metres, is unsure.
     #[arg(long, default_value_t = 20.0)]
-    metres: f64,
+    meters: f64,
     /// Chooses the moments.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -103,7 +103,7 @@ pub(super) async fn run(arguments: &LocalizationArguments) -> Result<()> {
     let bar = ProgressBar::new(starts.len() as u64).with_style(style).with_prefix("localising");
     let mut trials = Vec::new();
     for (idx, &start) in starts.iter().enumerate() {
-        trials.push(trial(&server.client, &log, start, &mapped, arguments.metres).await?);
+        trials.push(trial(&server.client, &log, start, &mapped, arguments.meters).await?);
         let found = trials.iter().filter(|trial| trial.outcome() == TrialOutcome::Found).count();
         let wrong = trials.iter().filter(|trial| trial.outcome() == TrialOutcome::WronglySure).count();
         bar.set_message(format!("{found} found, {wrong} wrongly sure, {} unsure", idx + 1 - found - wrong));
@@ -181,7 +181,7 @@ fn starts(log: &Known, mapped: &[(Pose2, Pose2)], arguments: &LocalizationArgume
     let end_m = log.travel_m.last().copied().unwrap_or(0.0);
     let is_fair = |idx: &usize| {
         let near = |truth: Pose2| mapped.iter().any(|(known, _)| known.distance(&truth) < MAPPED_M);
-        end_m - log.travel_m[*idx] >= arguments.metres && log.truth[*idx].is_some_and(near)
+        end_m - log.travel_m[*idx] >= arguments.meters && log.truth[*idx].is_some_and(near)
     };
     let fair: Vec<usize> = (0..log.travel_m.len()).filter(is_fair).collect();
     let mut rng = ChaCha8Rng::seed_from_u64(arguments.seed);
@@ -199,7 +199,7 @@ async fn trial(
 ) -> Result<LocalizationTrial> {
     let recording = &log.recording;
     let robot = NewRun { robot: "evaluation".into(), geometry: wire_geometry(&recording.log.geometry) };
-    let opened = client.open_localisation(SITE, &robot).await.context("a localisation cannot be opened")?;
+    let opened = client.open_localization(SITE, &robot).await.context("a localisation cannot be opened")?;
     let mut next = start;
     let mut answered = None;
     while answered.is_none() && log.travel_m[next] - log.travel_m[start] < limit_m {
@@ -209,16 +209,16 @@ async fn trial(
         let geometry = &recording.log.geometry;
         let scans: Vec<Scan> =
             recording.log.scans[next..end].iter().map(|scan| wire_scan(geometry, scan)).collect();
-        let answer = client.localise(SITE, &opened.id, (next - start) as u64, &scans).await?;
+        let answer = client.localize(SITE, &opened.id, (next - start) as u64, &scans).await?;
         next = end.min(log.travel_m.len() - 1);
-        if answer.state == LocalisationState::Converged {
+        if answer.state == LocalizationState::Converged {
             answered = answer.hypotheses.first().map(|best| (end - 1, best.pose));
         }
         if end >= log.travel_m.len() {
             break;
         }
     }
-    client.close_localisation(SITE, &opened.id).await?;
+    client.close_localization(SITE, &opened.id).await?;
     let last = answered.map_or(next, |(last, _)| last);
     let truth = log.truth[last].map_or(Pose2::identity(), |truth| expected_pose(&truth, mapped));
     Ok(LocalizationTrial {
@@ -236,7 +236,7 @@ pub(super) fn expected_pose(truth: &Pose2, mapped: &[(Pose2, Pose2)]) -> Pose2 {
 
 fn print_report(report: &Report) {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} m"));
+    let meters = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.1} m"));
     let result = &report.localization;
     println!("\n{} switched on in {} on the map of {}", result.trials, report.log, report.map_from);
     println!("  found            {}", percent(result.found));
@@ -244,8 +244,8 @@ fn print_report(report: &Report) {
     println!("  honestly unsure  {}", percent(result.honestly_unsure));
     println!(
         "  driven until sure: median {}, nine of ten within {}",
-        metres(result.metres_to_converge.median),
-        metres(result.metres_to_converge.p90)
+        meters(result.meters_to_converge.median),
+        meters(result.meters_to_converge.p90)
     );
     println!("  time             {:.1} s", report.seconds);
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use clap::Args;
-use locution_client::{Client, Geometry, LocalisationState, Scan};
+use locution_client::{Client, Geometry, LocalizationState, Scan};
 use locution_engine::evaluation::{ExampleReport, ExampleTrial, judge_examples};
 use locution_engine::formats::CarmenOptions;
 use locution_engine::geometry::Pose2;
@@ -127,7 +127,7 @@ async fn ask(
     Ok(ExampleTrial {
         expected,
         answered: answer.places.iter().map(|found| (place(&found.pose), found.probability)).collect(),
-        is_sure: answer.state == LocalisationState::Converged,
+        is_sure: answer.state == LocalizationState::Converged,
         latency_s,
     })
 }

@@ -28,7 +28,7 @@ const EXTRA_WORDS: [usize; 3] = [0, 3, 6];
 const SHORTEST: u16 = 3;
 /// Figures 5.9 and 5.10 end here.
 const LONGEST_OF_FIGURE: u32 = 18;
-const GREY: [u8; 3] = [120, 120, 120];
+const GRAY: [u8; 3] = [120, 120, 120];
 const RED: [u8; 3] = [214, 39, 40];
 const BLUE: [u8; 3] = [31, 119, 180];
 const GREEN: [u8; 3] = [44, 160, 44];
@@ -94,7 +94,7 @@ fn precision_over_recall(
     published: &Published,
 ) -> Result<Vec<Vec<String>>> {
     let (mut curves, mut points, mut rows) = (Vec::new(), Vec::new(), Vec::new());
-    for (num_levels, color) in [(1, GREY), (2, BLUE)] {
+    for (num_levels, color) in [(1, GRAY), (2, BLUE)] {
         let matching = matching_with(vec![SHORTEST; num_levels]);
         let (chains, _) = chains_of(texts, &matching);
         let name = levels_name(num_levels);
@@ -123,8 +123,8 @@ fn with_mean_shift(scenario: &Scenario, texts: &Texts, published: &Published) ->
     let matching = matching_with(vec![SHORTEST; 2]);
     let (chains, _) = chains_of(&texts, &matching);
     let name = levels_name(2);
-    let metres = texts.travel_m / texts.num_words(0).max(1) as f64;
-    let what = format!("5.{} {name}, mean shift: {num_classes} classes, {metres:.1} m a word", scenario.name);
+    let meters = texts.travel_m / texts.num_words(0).max(1) as f64;
+    let what = format!("5.{} {name}, mean shift: {num_classes} classes, {meters:.1} m a word", scenario.name);
     let theirs = published.pair(&format!("/table_5_1/{name}/{}", scenario.name));
     let by_words = sweep_by_words(&texts, &chains, &EXTRA_WORDS);
     let by_evidence = sweep_by_evidence(&texts, &chains, &matching);
@@ -161,7 +161,7 @@ fn figures_5_9_and_5_10(out: &Path, scenario: &Scenario, texts: &Texts) -> Resul
     let words = |found: &FoundChain| found.chain.pairs.len();
     let single = sweep(texts, &chains, |found| (found.chain.max_level == 0).then_some(words(found) as f64));
     let longest = chains.iter().map(words).max().unwrap_or(1) as f64;
-    let mut curves: Vec<NamedCurve> = vec![("1 level".to_owned(), GREY, single)];
+    let mut curves: Vec<NamedCurve> = vec![("1 level".to_owned(), GRAY, single)];
     for (fixed, color) in [(4, RED), (6, BLUE), (8, GREEN)] {
         // Chains of level 0 that reach the fixed threshold always count; the rest by their length.
         let curve = sweep(texts, &chains, |found| match (found.chain.max_level, words(found)) {

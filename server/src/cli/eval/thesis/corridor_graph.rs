@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Context, Result};
-use locution_engine::formats::{LabelledPlaces, LabelledRegion};
+use locution_engine::formats::{LabeledPlaces, LabeledRegion};
 use locution_engine::geometry::Point2;
 
 /// A corridor: its letter, the places it runs through and its width.
@@ -86,9 +86,9 @@ impl Meeting {
 impl CorridorGraph {
     /// What kind of place each spot is: bifurcations and corners reach half a corridor's width beyond the crossing into
     /// each arm, as those that people drew on the recordings do; everything else is corridor.
-    pub(super) fn labelled_places(&self) -> LabelledPlaces {
+    pub(super) fn labeled_places(&self) -> LabeledPlaces {
         let mut meetings: BTreeMap<(i64, i64), Meeting> = BTreeMap::new();
-        let tenths = |metres: f64| (metres * 10.0).round() as i64;
+        let tenths = |meters: f64| (meters * 10.0).round() as i64;
         for corridor in &self.corridors {
             for leg in corridor.points.windows(2) {
                 for (from, to) in [(leg[0], leg[1]), (leg[1], leg[0])] {
@@ -100,7 +100,7 @@ impl CorridorGraph {
                 }
             }
         }
-        let mut regions: Vec<LabelledRegion> = meetings
+        let mut regions: Vec<LabeledRegion> = meetings
             .iter()
             .filter_map(|(&(x, y), meeting)| {
                 let (x, y, reach) = (x as f64 / 10.0, y as f64 / 10.0, meeting.width_m);
@@ -117,14 +117,14 @@ impl CorridorGraph {
                 region("corridor", low, high)
             })
         }));
-        LabelledPlaces { frame: "world".into(), notes: "Labelled by the simulator.".into(), regions }
+        LabeledPlaces { frame: "world".into(), notes: "Labelled by the simulator.".into(), regions }
     }
 }
 
 /// A rectangle between two opposite corners.
-fn region(label: &str, low: (f64, f64), high: (f64, f64)) -> LabelledRegion {
+fn region(label: &str, low: (f64, f64), high: (f64, f64)) -> LabeledRegion {
     let polygon = vec![[low.0, low.1], [high.0, low.1], [high.0, high.1], [low.0, high.1]];
-    LabelledRegion { label: label.into(), polygon }
+    LabeledRegion { label: label.into(), polygon }
 }
 
 /// The corners of a corridor, or the middle of a straight one.
@@ -173,7 +173,7 @@ mod tests {
                 corridor('C', &[(10.0, 0.0), (10.0, 9.0)]),
             ],
         };
-        let places = graph.labelled_places();
+        let places = graph.labeled_places();
         let label = |x, y| places.label_at(&Point2::new(x, y));
         assert_eq!(label(5.0, 0.5), Some("corridor"));
         assert_eq!(label(10.0, 1.5), Some("bifurcation"));

@@ -211,10 +211,10 @@ fn submaps_of(scenario: &Scenario, texts: &Texts, config: &TranslatorConfig) -> 
 /// Centres of the occupied cells around the robot, in the run's frame.
 fn occupied_points(map: &LocalMap, radius_m: f64) -> impl Iterator<Item = Point2> + '_ {
     let reach = (radius_m / map.resolution_m()).ceil() as i32;
-    map.robot_cell().into_iter().flat_map(move |centre| {
+    map.robot_cell().into_iter().flat_map(move |center| {
         let around = (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (dx, dy)));
         around
-            .map(move |(dx, dy)| Cell { x: centre.x + dx, y: centre.y + dy })
+            .map(move |(dx, dy)| Cell { x: center.x + dx, y: center.y + dy })
             .filter(|&cell| map.is_occupied(cell))
             .map(|cell| cell.center(map.resolution_m()))
     })

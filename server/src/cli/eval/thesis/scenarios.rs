@@ -5,7 +5,7 @@
 
 use anyhow::Result;
 use clap::ValueEnum;
-use locution_engine::formats::LabelledPlaces;
+use locution_engine::formats::LabeledPlaces;
 use locution_engine::geometry::Point2;
 use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 use rand::{RngExt, SeedableRng};
@@ -74,13 +74,13 @@ impl Plan {
     ///
     /// # Errors
     /// The world cannot be made.
-    pub(in crate::cli) fn draw(self) -> Result<(World, LabelledPlaces)> {
+    pub(in crate::cli) fn draw(self) -> Result<(World, LabeledPlaces)> {
         let (graph, size_m) = match self {
             Self::Adjacent => four_loops_graph(),
             Self::Nested => nested_loops_graph(),
             Self::Pair => two_loops_graph(),
         };
-        Ok((floor(&graph, size_m)?, graph.labelled_places()))
+        Ok((floor(&graph, size_m)?, graph.labeled_places()))
     }
 }
 

@@ -61,7 +61,7 @@ pub(super) fn chapter_4(arguments: &ThesisArguments, published: &Published) -> R
         print_grams(&curves);
         let file = format!("figure_4_12_{}", scenario.name.to_lowercase());
         plot_over_n(&arguments.out, &file, &format!("scenario {}", scenario.name), &curves, 20)?;
-        measured.extend(quantiser_and_kernel_table(&scenario, &texts)?);
+        measured.extend(quantizer_and_kernel_table(&scenario, &texts)?);
         if scenario.name == "C" {
             measured.extend(table_4_2(arguments, published, &scenario, &texts, &config)?);
         }
@@ -109,7 +109,7 @@ fn figure_4_13(out: &Path, scenario: &Scenario, texts: &Texts, chains: &[FoundCh
 }
 
 /// Other quantisers, kernels and bandwidths, sizes within 20 %.
-fn quantiser_and_kernel_table(scenario: &Scenario, plain: &Texts) -> Result<Vec<Measured>> {
+fn quantizer_and_kernel_table(scenario: &Scenario, plain: &Texts) -> Result<Vec<Measured>> {
     let kernel = |profile, bandwidth_m| {
         let mut config = thesis_translator(bandwidth_m);
         config.density.kernels[0] = KernelConfig { profile, bandwidth_m };

@@ -10,13 +10,13 @@ use super::common::PoseDto;
 use super::runs::GeometryDto;
 use crate::app::NewBatch;
 use crate::app::examples::{ExampleInfo, ExamplePlace};
-use crate::app::localisations::LocalisationInfo;
+use crate::app::localizations::LocalizationInfo;
 use crate::error::ApiError;
 
 /// Opens a localisation; the same body as that of a run.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
-pub struct NewLocalisationDto {
+pub struct NewLocalizationDto {
     /// The robot, for the log.
     pub robot: Option<String>,
     /// The laser.
@@ -26,7 +26,7 @@ pub struct NewLocalisationDto {
 /// How sure an answer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum LocalisationStateDto {
+pub enum LocalizationStateDto {
     /// No place of the map explains what is seen.
     Lost,
     /// Several places do, or one does not well enough.
@@ -35,7 +35,7 @@ pub enum LocalisationStateDto {
     Converged,
 }
 
-impl From<LocalizationState> for LocalisationStateDto {
+impl From<LocalizationState> for LocalizationStateDto {
     fn from(state: LocalizationState) -> Self {
         match state {
             LocalizationState::Lost => Self::Lost,
@@ -60,13 +60,13 @@ pub struct HypothesisDto {
 
 /// A localisation as it stands.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub struct LocalisationDto {
+pub struct LocalizationDto {
     /// Its name.
     pub id: String,
     /// The map version it looks in.
     pub map_version: u64,
     /// How sure it is.
-    pub state: LocalisationStateDto,
+    pub state: LocalizationStateDto,
     /// The sequence number to send next.
     pub next_sequence: u64,
     /// Metres driven since it began.
@@ -75,8 +75,8 @@ pub struct LocalisationDto {
     pub hypotheses: Vec<HypothesisDto>,
 }
 
-impl From<LocalisationInfo> for LocalisationDto {
-    fn from(info: LocalisationInfo) -> Self {
+impl From<LocalizationInfo> for LocalizationDto {
+    fn from(info: LocalizationInfo) -> Self {
         Self {
             id: info.id.to_string(),
             map_version: info.map_version,
@@ -88,8 +88,8 @@ impl From<LocalisationInfo> for LocalisationDto {
     }
 }
 
-fn hypotheses_of(info: &LocalisationInfo) -> Vec<HypothesisDto> {
-    let hypothesis = |found: &crate::app::localisations::LocatedHypothesis| HypothesisDto {
+fn hypotheses_of(info: &LocalizationInfo) -> Vec<HypothesisDto> {
+    let hypothesis = |found: &crate::app::localizations::LocatedHypothesis| HypothesisDto {
         component: found.component,
         map_from_robot: found.map_from_robot.into(),
         covariance: found.covariance,
@@ -127,7 +127,7 @@ pub struct ExampleAnswerDto {
     /// The map version looked in.
     pub map_version: u64,
     /// `lost` means "not here".
-    pub state: LocalisationStateDto,
+    pub state: LocalizationStateDto,
     /// Metres that the example drives.
     pub travel_m: f64,
     /// Places where the robot was at the end of the example, likeliest first.

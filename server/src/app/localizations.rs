@@ -47,7 +47,7 @@ pub struct LocatedHypothesis {
 
 /// The answer of a session.
 #[derive(Clone, Debug)]
-pub struct LocalisationInfo {
+pub struct LocalizationInfo {
     /// Its number.
     pub id: u64,
     /// The map version it looks in.
@@ -64,7 +64,7 @@ pub struct LocalisationInfo {
 
 /// The sessions of this process.
 #[derive(Default)]
-pub struct Localisations {
+pub struct Localizations {
     table: Mutex<SessionTable>,
 }
 
@@ -193,11 +193,11 @@ impl App {
     /// # Errors
     /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
     /// [`AppError::Busy`] when there are too many sessions.
-    pub async fn open_localisation(
+    pub async fn open_localization(
         &self,
         site: &Site,
         geometry: ScanGeometry,
-    ) -> Result<LocalisationInfo, AppError> {
+    ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
         let search = self.new_search(site, &map, &geometry).await?;
@@ -208,22 +208,22 @@ impl App {
             latest_use: Mutex::new(Instant::now()),
             search: tokio::sync::Mutex::new(search),
         };
-        let id = self.localisations.insert(session, self.config().limits.num_localisations_max)?;
-        self.localisation(site, id).await
+        let id = self.localizations.insert(session, self.config().limits.num_localizations_max)?;
+        self.localization(site, id).await
     }
 
     /// The answer of a session as it stands.
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub async fn localisation(&self, site: &Site, id: u64) -> Result<LocalisationInfo, AppError> {
+    pub async fn localization(&self, site: &Site, id: u64) -> Result<LocalizationInfo, AppError> {
         let session = self.session(site, id)?;
         let search = session.search.lock().await;
         let estimating = search.clone();
         let next_sequence = search.next_sequence;
         drop(search);
         let (state, travel_m, hypotheses) = on_blocking_thread(move || estimating.estimate()).await?;
-        Ok(LocalisationInfo {
+        Ok(LocalizationInfo {
             id,
             map_version: session.map_version,
             state,
@@ -237,12 +237,12 @@ impl App {
     ///
     /// # Errors
     /// [`AppError::Sequence`], [`AppError::Invalid`], [`AppError::NotFound`].
-    pub async fn localise(
+    pub async fn localize(
         &self,
         site: &Site,
         id: u64,
         batch: NewBatch,
-    ) -> Result<LocalisationInfo, AppError> {
+    ) -> Result<LocalizationInfo, AppError> {
         let session = self.session(site, id)?;
         let mut search = session.search.lock().await;
         let expected_sequence = search.next_sequence;
@@ -260,21 +260,21 @@ impl App {
         })
         .await?;
         drop(search);
-        self.localisation(site, id).await
+        self.localization(site, id).await
     }
 
     /// Closes a session.
     ///
     /// # Errors
     /// [`AppError::NotFound`].
-    pub fn close_localisation(&self, site: &Site, id: u64) -> Result<(), AppError> {
+    pub fn close_localization(&self, site: &Site, id: u64) -> Result<(), AppError> {
         self.session(site, id)?;
-        self.localisations.table().sessions.remove(&id);
+        self.localizations.table().sessions.remove(&id);
         Ok(())
     }
 
     fn session(&self, site: &Site, id: u64) -> Result<Arc<Session>, AppError> {
-        let table = self.localisations.table();
+        let table = self.localizations.table();
         let session = table.sessions.get(&id).filter(|session| session.site == site.name().as_str());
         let session = session.ok_or_else(|| AppError::not_found("localisation", id))?;
         *session.latest_use.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
@@ -339,7 +339,7 @@ impl App {
     }
 }
 
-impl Localisations {
+impl Localizations {
     /// Keeps a session when there is room after the idle ones went.
     fn insert(&self, session: Session, num_max: usize) -> Result<u64, AppError> {
         let mut table = self.table();

@@ -11,7 +11,7 @@ use crate::upload::{Encoding, batch_body};
 /// How sure the answer is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum LocalisationState {
+pub enum LocalizationState {
     /// Nothing fits yet.
     #[default]
     Lost,
@@ -40,7 +40,7 @@ pub struct ExampleAnswer {
     /// The site.
     pub site: String,
     /// `Lost` means "not here".
-    pub state: LocalisationState,
+    pub state: LocalizationState,
     /// Metres that the recording drives.
     pub travel_m: f64,
     /// Places where it may end, likeliest first.
@@ -56,12 +56,12 @@ struct ExampleQuery<'a> {
 /// A localisation as it stands.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]
-pub struct Localisation {
+pub struct Localization {
     /// Its name within the site.
     #[serde(alias = "localisation")]
     pub id: String,
     /// How sure it is.
-    pub state: LocalisationState,
+    pub state: LocalizationState,
     /// Places where the robot may be, likeliest first.
     pub hypotheses: Vec<Hypothesis>,
     /// Sequence number that the next scan must have.
@@ -73,7 +73,7 @@ impl Client {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn open_localisation(&self, site: &str, robot: &NewRun) -> Result<Localisation, ClientError> {
+    pub async fn open_localization(&self, site: &str, robot: &NewRun) -> Result<Localization, ClientError> {
         self.json(Method::POST, &format!("/v1/sites/{site}/localisations"), Body::json(robot)?).await
     }
 
@@ -81,14 +81,14 @@ impl Client {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn localise(
+    pub async fn localize(
         &self,
         site: &str,
-        localisation: &str,
+        localization: &str,
         first_sequence: u64,
         scans: &[Scan],
-    ) -> Result<Localisation, ClientError> {
-        let path = format!("/v1/sites/{site}/localisations/{localisation}/batches");
+    ) -> Result<Localization, ClientError> {
+        let path = format!("/v1/sites/{site}/localisations/{localization}/batches");
         self.json(Method::POST, &path, batch_body(first_sequence, scans, Encoding::Cbor)?).await
     }
 
@@ -110,8 +110,8 @@ impl Client {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn close_localisation(&self, site: &str, localisation: &str) -> Result<(), ClientError> {
-        let path = format!("/v1/sites/{site}/localisations/{localisation}");
+    pub async fn close_localization(&self, site: &str, localization: &str) -> Result<(), ClientError> {
+        let path = format!("/v1/sites/{site}/localisations/{localization}");
         self.send(Method::DELETE, &path, "application/json", Body::Empty).await.map(drop)
     }
 }

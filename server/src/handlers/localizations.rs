@@ -7,64 +7,64 @@ use axum::{Extension, Json};
 use crate::app::AppError;
 use crate::auth::Identity;
 use crate::dto::batches::BatchDto;
-use crate::dto::localisations::{ExampleAnswerDto, ExampleQueryDto, LocalisationDto, NewLocalisationDto};
+use crate::dto::localizations::{ExampleAnswerDto, ExampleQueryDto, LocalizationDto, NewLocalizationDto};
 use crate::error::{ApiError, Problem};
 use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
 use crate::state::AppState;
 
 /// Open a localisation in the serving map; nothing of it is stored.
 #[utoipa::path(post, path = "/v1/sites/{site}/localisations", operation_id = "open_localisation",
-    tag = "localisation", params(("site" = String, Path)), request_body = NewLocalisationDto,
-    responses((status = 201, body = LocalisationDto), (status = 404, body = Problem), (status = 409, body = Problem),
+    tag = "localisation", params(("site" = String, Path)), request_body = NewLocalizationDto,
+    responses((status = 201, body = LocalizationDto), (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 422, body = Problem), (status = 429, body = Problem)))]
-pub async fn open_localisation(
+pub async fn open_localization(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
-    Body(new): Body<NewLocalisationDto>,
-) -> Result<(StatusCode, Json<LocalisationDto>), ApiError> {
+    Body(new): Body<NewLocalizationDto>,
+) -> Result<(StatusCode, Json<LocalizationDto>), ApiError> {
     let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.open_localisation(&site, geometry).await?;
+    let info = state.app.open_localization(&site, geometry).await?;
     Ok((StatusCode::CREATED, Json(info.into())))
 }
 
 /// The answer as it stands.
 #[utoipa::path(get, path = "/v1/sites/{site}/localisations/{id}", operation_id = "get_localisation",
     tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
-    responses((status = 200, body = LocalisationDto), (status = 404, body = Problem)))]
-pub async fn get_localisation(
+    responses((status = 200, body = LocalizationDto), (status = 404, body = Problem)))]
+pub async fn get_localization(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     IdOf(id): IdOf,
-) -> Result<Json<LocalisationDto>, ApiError> {
-    Ok(Json(state.app.localisation(&site, id).await?.into()))
+) -> Result<Json<LocalizationDto>, ApiError> {
+    Ok(Json(state.app.localization(&site, id).await?.into()))
 }
 
 /// Feed scans, in the batches of a run, and get the answer after them.
 #[utoipa::path(post, path = "/v1/sites/{site}/localisations/{id}/batches", operation_id = "localise",
     tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
     request_body(content((BatchDto = "application/json"), (BatchDto = "application/cbor"))),
-    responses((status = 200, body = LocalisationDto), (status = 404, body = Problem), (status = 409, body = Problem),
+    responses((status = 200, body = LocalizationDto), (status = 404, body = Problem), (status = 409, body = Problem),
         (status = 422, body = Problem)))]
-pub async fn localise(
+pub async fn localize(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     IdOf(id): IdOf,
     BatchSlot(_slot): BatchSlot,
     Body(batch): Body<BatchDto>,
-) -> Result<Json<LocalisationDto>, ApiError> {
-    Ok(Json(state.app.localise(&site, id, batch.try_into()?).await?.into()))
+) -> Result<Json<LocalizationDto>, ApiError> {
+    Ok(Json(state.app.localize(&site, id, batch.try_into()?).await?.into()))
 }
 
 /// Close a localisation.
 #[utoipa::path(delete, path = "/v1/sites/{site}/localisations/{id}", operation_id = "close_localisation",
     tag = "localisation", params(("site" = String, Path), ("id" = String, Path)),
     responses((status = 204), (status = 404, body = Problem)))]
-pub async fn close_localisation(
+pub async fn close_localization(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     IdOf(id): IdOf,
 ) -> Result<StatusCode, ApiError> {
-    state.app.close_localisation(&site, id)?;
+    state.app.close_localization(&site, id)?;
     Ok(StatusCode::NO_CONTENT)
 }
 
