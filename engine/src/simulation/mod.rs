@@ -20,6 +20,8 @@ mod ray_cast;
 mod run;
 mod world;
 
+pub(crate) use gaussian::standard_normal;
+
 pub use config::{DriveConfig, LaserConfig, OdometryNoise, PeopleConfig, SimulationConfig};
 pub use planner::{PlanError, Planner};
 pub use ray_cast::Disc;
