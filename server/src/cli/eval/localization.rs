@@ -18,7 +18,7 @@ use serde::Serialize;
 use super::local_server::{LocalServer, SITE, build_map};
 use crate::cli::output::write_json;
 use crate::cli::recordings::{Recording, read_recording, read_truth, wire_geometry, wire_scan};
-use crate::cli::upload::{UploadOptions, progress_bar, upload_recording};
+use crate::cli::upload::{UploadOptions, open_run, progress_bar, upload_recording};
 
 /// A start is only fair where the map has been: nearer than this to a mapped place.
 pub(super) const MAPPED_M: f64 = 2.0;
@@ -164,9 +164,11 @@ pub(super) async fn build(
 ) -> Result<Vec<(Pose2, Pose2)>> {
     server.client.put_site(SITE, config).await?;
     let name = map.recording.name.as_str();
-    let bar = progress_bar(&indicatif::MultiProgress::new(), name, map.recording.log.scans.len());
+    let bar = progress_bar(name, map.recording.log.scans.len());
     let options = UploadOptions::default();
-    upload_recording(&server.client, (SITE, name, name), &map.recording.log, &options, &bar).await?;
+    let upload = open_run(&server.client, (SITE, name, name), &map.recording.log, &options).await?;
+    upload_recording(&server.client, (SITE, name), upload, &map.recording.log, &options, &bar).await?;
+    bar.finish();
     build_map(server).await?;
     let trajectory = server.client.trajectory(SITE, name, "map").await?;
     let pairs = trajectory.poses.iter().filter_map(|pose| {

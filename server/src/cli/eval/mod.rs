@@ -10,6 +10,7 @@ mod map;
 mod plot;
 mod query;
 pub mod recognition;
+mod robust;
 mod stroke_font;
 pub(in crate::cli) mod thesis;
 
@@ -32,6 +33,8 @@ enum What {
     Localization(localization::LocalizationArguments),
     /// Short recordings that are not stored: found in the map, or honestly not here.
     Query(query::QueryArguments),
+    /// Pose graphs with forged closures: how often the optimizer is not misled.
+    Robust(robust::RobustArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
     Thesis(thesis::ThesisArguments),
 }
@@ -49,6 +52,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Labels(arguments) => labels::run(arguments).await,
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
+            What::Robust(arguments) => robust::run(arguments),
             What::Thesis(arguments) => thesis::run(arguments),
         }
     })
