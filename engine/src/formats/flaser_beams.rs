@@ -109,7 +109,10 @@ fn is_thinned(num_ranges: usize) -> bool {
 /// `num_gaps` increments that begin at half the field of view to the right.
 fn beams_over(field_of_view_rad: f64, num_gaps: usize) -> Result<BeamAngles, String> {
     if !(field_of_view_rad > 0.0 && field_of_view_rad <= TAU * 1.001) {
-        return Err(format!("a field of view of {:.2} degrees; {HOW_TO_STATE}", field_of_view_rad.to_degrees()));
+        return Err(format!(
+            "a field of view of {:.2} degrees; {HOW_TO_STATE}",
+            field_of_view_rad.to_degrees()
+        ));
     }
     Ok(BeamAngles { min_rad: -0.5 * field_of_view_rad, increment_rad: field_of_view_rad / num_gaps as f64 })
 }
@@ -168,16 +171,23 @@ mod tests {
 
     #[test]
     fn what_is_stated_of_other_lasers_does_not_count() {
-        let others = stated(&["laser_rear_laser_fov 90 h 0", "laser_laser2_fov 270 h 0", "robot_width 0.5 h 0"]);
+        let others =
+            stated(&["laser_rear_laser_fov 90 h 0", "laser_laser2_fov 270 h 0", "robot_width 0.5 h 0"]);
         assert_eq!(others, StatedLaser::default());
-        assert_eq!(stated(&["laser_front_laser_fov none h 0", "laser_front_laser_fov"]), StatedLaser::default());
+        assert_eq!(
+            stated(&["laser_front_laser_fov none h 0", "laser_front_laser_fov"]),
+            StatedLaser::default()
+        );
     }
 
     #[test]
     fn statements_that_contradict_the_readings_are_told() {
         let laser = stated(&["laser_front_laser_fov 180 h 0", "laser_front_laser_resolution 1.0 h 0"]);
         assert!(laser.beams(682, None).unwrap_err().contains("resolution 1"));
-        assert!(is_near(degrees(&laser, 361), (-90.0, 0.5)), "the head of the log was left as it is delivered");
+        assert!(
+            is_near(degrees(&laser, 361), (-90.0, 0.5)),
+            "the head of the log was left as it is delivered"
+        );
         assert!(stated(&["laser_front_laser_fov 500 h 0"]).beams(682, None).is_err());
     }
 }

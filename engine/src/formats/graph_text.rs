@@ -183,9 +183,8 @@ impl GraphLines {
     fn successors(&self, ascending: &[u64]) -> BTreeMap<u64, u64> {
         let edges: BTreeSet<(u64, u64)> =
             self.edges.iter().flat_map(|edge| [(edge.i, edge.j), (edge.j, edge.i)]).collect();
-        let num_chained = |order: &[u64]| {
-            order.windows(2).filter(|pair| edges.contains(&(pair[0], pair[1]))).count()
-        };
+        let num_chained =
+            |order: &[u64]| order.windows(2).filter(|pair| edges.contains(&(pair[0], pair[1]))).count();
         let is_mixed = num_chained(&self.mentioned) > num_chained(ascending);
         let order = if is_mixed { &self.mentioned } else { ascending };
         order.windows(2).map(|pair| (pair[0], pair[1])).collect()

@@ -147,7 +147,10 @@ pub fn parse_map_server_yaml(text: &str) -> Result<MapServerYaml, FormatError> {
     };
     if let Some(negate) = page.negate.as_ref().filter(|_| is_negated && page.mode == MapMode::Raw) {
         // One map_server turns the values round, another does not.
-        return Err(at(negate, "negate together with mode raw is not supported, as map servers disagree on it"));
+        return Err(at(
+            negate,
+            "negate together with mode raw is not supported, as map servers disagree on it",
+        ));
     }
     let map_from_image = match &page.origin {
         None => Pose2::identity(),
@@ -254,7 +257,8 @@ mod tests {
 
     #[test]
     fn says_the_same_in_every_way_that_yaml_has() {
-        let plain = "image: a.pgm\nresolution: 0.1\norigin: [-1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\n";
+        let plain =
+            "image: a.pgm\nresolution: 0.1\norigin: [-1.0, -2.0, 0.5]\nnegate: 0\noccupied_thresh: 0.65\n";
         let expected = parse_map_server_yaml(plain).unwrap();
         for text in [
             plain.replace("[-1.0, -2.0, 0.5]", "\n- -1.0\n- -2\n- 5e-1"),
@@ -262,7 +266,8 @@ mod tests {
             format!("%YAML 1.2\n---\n{plain}"),
             plain.replace("0.1", "\"0.100000\"").replace("a.pgm", "'a.pgm' # ours"),
             format!("\u{feff}{}", plain.replace('\n', "\r\n")),
-            "{image: a.pgm, resolution: 0.1, origin: [-1, -2, 0.5], negate: no, mode: trinary, more: {a: 1}}".into(),
+            "{image: a.pgm, resolution: 0.1, origin: [-1, -2, 0.5], negate: no, mode: trinary, more: {a: 1}}"
+                .into(),
         ] {
             assert_eq!(parse_map_server_yaml(&text).as_ref(), Ok(&expected), "{text}");
         }
@@ -276,7 +281,11 @@ mod tests {
             ("image: a.pgm\nresolution: -1", 2, "a resolution of -1 m"),
             ("image: a.pgm\nresolution: fine", 2, "invalid floating point"),
             (&format!("{whole}origin: [1, 2]"), 3, "the origin must be three finite numbers: x, y and yaw"),
-            (&format!("{whole}origin: [1, 2, .nan]"), 3, "the origin must be three finite numbers: x, y and yaw"),
+            (
+                &format!("{whole}origin: [1, 2, .nan]"),
+                3,
+                "the origin must be three finite numbers: x, y and yaw",
+            ),
             (&format!("{whole}negate: 2"), 3, "negate is '2', neither 0 nor 1"),
             (&format!("{whole}free_thresh: 19"), 3, "a threshold of 19, not between 0 and 1"),
             (&format!("{whole}mode: raw\nnegate: 1"), 4, "negate together with mode raw"),
@@ -298,8 +307,14 @@ mod tests {
         assert_eq!(read(&with("mode: trinary"), pixels), [Some(0), None, None, Some(100)]);
         assert_eq!(read(&with("negate: true"), pixels), [Some(100), None, None, Some(0)]);
         let raw = with("mode: raw");
-        assert_eq!(read(&raw, [(0, 255), (19, 255), (100, 0), (255, 255)]), [Some(0), Some(19), Some(100), None]);
-        assert_eq!([0, 19, 20, 100, 255].map(|gray| raw.is_free(gray, 255)), [true, true, false, false, false]);
+        assert_eq!(
+            read(&raw, [(0, 255), (19, 255), (100, 0), (255, 255)]),
+            [Some(0), Some(19), Some(100), None]
+        );
+        assert_eq!(
+            [0, 19, 20, 100, 255].map(|gray| raw.is_free(gray, 255)),
+            [true, true, false, false, false]
+        );
         assert_eq!([254, 205, 150].map(|gray| scale.is_free(gray, 255)), [true, false, false]);
     }
 

@@ -123,9 +123,10 @@ impl<'a> Problem<'a> {
 
     /// χ² below which nothing but rounding is left at the present poses.
     fn chi2_of_rounding(&self) -> f64 {
-        let extent_m = self.poses.iter().fold(0.0_f64, |extent, turned| {
-            extent.max(turned.pose.x.abs()).max(turned.pose.y.abs())
-        });
+        let extent_m = self
+            .poses
+            .iter()
+            .fold(0.0_f64, |extent, turned| extent.max(turned.pose.x.abs()).max(turned.pose.y.abs()));
         self.constraints.iter().map(|constraint| constraint.chi2_of_rounding(extent_m)).sum()
     }
 
