@@ -178,7 +178,7 @@ impl CarmenReader {
                 .beams(num_ranges, self.options.field_of_view_deg)
                 .map_err(|problem| FormatError::new(*line, problem))?,
         };
-        check_metres(&self.scans, *line)?;
+        check_meters(&self.scans, *line)?;
         let geometry = ScanGeometry {
             num_ranges,
             angle_min_rad: beams.min_rad,
@@ -273,7 +273,7 @@ fn parse_timestamp(fields: &mut Fields<'_>) -> Result<i64, FormatError> {
 const PLAUSIBLE_RANGE_M: f32 = 200.0;
 
 /// Refuses a log most of whose readings are no metres.
-fn check_metres(scans: &[Scan], line: usize) -> Result<(), FormatError> {
+fn check_meters(scans: &[Scan], line: usize) -> Result<(), FormatError> {
     let readings = || scans.iter().flat_map(|scan| &scan.ranges_m).filter(|range| range.is_finite());
     let num_far = readings().filter(|&&range| range > PLAUSIBLE_RANGE_M).count();
     if 2 * num_far > readings().count() {
