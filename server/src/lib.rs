@@ -27,6 +27,7 @@ pub mod extract;
 pub mod handlers;
 pub mod openapi;
 pub mod picture;
+pub mod records;
 pub mod router;
 pub mod state;
 pub mod storage;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::labels::{LabelAnswer, LabelPattern, LabeledStretch};
+use crate::app::maps::{LabelAnswer, LabelPattern, LabeledStretch};
 use crate::error::ApiError;
 
 /// Most parts of a question.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::common::PoseDto;
-use crate::app::word_queries::{WordAnswer, WordPattern};
+use crate::app::ask::{WordAnswer, WordPattern};
 use crate::error::ApiError;
 
 /// Most words of a question.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::{Frame, StampedPose, Trajectory};
+use crate::app::runs::{Frame, StampedPose, Trajectory};
 
 /// A density sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]

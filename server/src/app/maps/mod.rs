@@ -1,0 +1,21 @@
+//! Map versions: written whole, then served; what they hold, and the forms in which other tools read them.
+
+mod changes;
+mod exports;
+mod grids;
+mod labels;
+mod matches;
+mod places;
+mod regions;
+mod write;
+
+pub use changes::{NoSessions, Sessions};
+pub use exports::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
+pub use grids::GridKey;
+pub use labels::{LabelAnswer, LabelPattern, LabeledMap, LabeledStretch, find_labels, label_map, labels};
+pub use matches::{
+    MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, holds_for, matches, undecide,
+};
+pub use places::{find_route, places};
+pub use regions::{Region, Topology, pose_at, topology};
+pub use write::{WrittenRun, serve_map, write_map};
