@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use locution_engine::mapping::PlaceMatch;
+use locution_engine::recording::{PlacedKeyframe, RunTrajectory};
 use locution_engine::scan::Scan;
 use locution_engine::semantics::PlaceMap;
 
@@ -12,6 +13,7 @@ use super::pieces::{join_pieces, pieces};
 use super::reader::SiteReader;
 use super::run::Run;
 use super::series;
+use super::stored::StoredKeyframe;
 use super::stored_map::{MapPose, MapRecord, MapRun, StoredLabel};
 use crate::storage::{Batch, StorageError};
 
@@ -51,6 +53,15 @@ impl Map {
     /// [`StorageError::Corrupt`] when one of them is missing.
     pub async fn poses(&self, run: &MapRun) -> Result<Vec<MapPose>, StorageError> {
         self.part(PartKind::Poses, run.first_pose..run.first_pose + run.num_poses).await
+    }
+
+    /// Where a run was at any scan.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`] when one of its keyframes is missing.
+    pub async fn trajectory(&self, run: &MapRun) -> Result<RunTrajectory, StorageError> {
+        let keyframes = self.reader.run(run.run).await?.stored_keyframes().await?;
+        Ok(trajectory_of(&keyframes, &self.poses(run).await?))
     }
 
     /// Labels of a run's observations.
@@ -153,6 +164,14 @@ pub enum Visit {
 }
 
 impl PlacedRun {
+    /// Where the run was at any scan.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`] when one of its keyframes is missing.
+    pub async fn trajectory(&self) -> Result<RunTrajectory, StorageError> {
+        Ok(trajectory_of(&self.run.stored_keyframes().await?, &self.poses))
+    }
+
     /// The scans of keyframes `range`, in their order.
     ///
     /// # Errors
@@ -167,6 +186,18 @@ impl PlacedRun {
         let is_keyframe = |(sequence, _): &(u64, Scan)| wanted.next_if_eq(sequence).is_some();
         Ok((first..).zip(scans).filter(is_keyframe).map(|(_, scan)| scan).collect())
     }
+}
+
+/// Keyframes that came after the map was built have no pose in it.
+fn trajectory_of(keyframes: &[StoredKeyframe], poses: &[MapPose]) -> RunTrajectory {
+    let placed = keyframes.iter().zip(poses);
+    placed
+        .map(|(keyframe, pose)| PlacedKeyframe {
+            scan_seq: keyframe.scan_seq,
+            run_from_robot: keyframe.run_from_robot,
+            map_from_robot: pose.map_from_robot,
+        })
+        .collect()
 }
 
 /// Writes the places of a component into a batch, as JSON in pieces.

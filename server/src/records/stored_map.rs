@@ -1,6 +1,7 @@
 //! Plain data of a map version; postcard keeps the order of fields.
 
 use locution_engine::geometry::Pose2;
+use locution_engine::semantics::PlaceLabel;
 use serde::{Deserialize, Serialize};
 
 use super::keys::{MapVersion, RunIdx};
@@ -68,4 +69,10 @@ pub struct StoredLabel {
     pub label_idx: u8,
     /// Share of what was seen that agrees with it.
     pub confidence: f32,
+}
+
+impl From<&(PlaceLabel, f32)> for StoredLabel {
+    fn from((label, confidence): &(PlaceLabel, f32)) -> Self {
+        Self { label_idx: label.index() as u8, confidence: *confidence }
+    }
 }

@@ -9,7 +9,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
 use locution_engine::locate::LocalizationState;
-use locution_engine::mapping::{Keyframe, MappedRun, place_in_map};
 use locution_engine::recall::{
     Calibration, Example, FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive, RecallConfig,
 };
@@ -233,32 +232,15 @@ async fn add_drive(
 ) -> Result<PlaceIndexBuilder, AppError> {
     let run = map.reader().run(map_run.run).await?;
     let observations = run.observations(0, map_run.num_labels as usize).await?;
-    let keyframes: Vec<Keyframe> = run
-        .stored_keyframes()
-        .await?
-        .into_iter()
-        .take(map_run.num_poses as usize)
-        .map(|keyframe| Keyframe {
-            scan_seq: keyframe.scan_seq,
-            timestamp_ns: 0,
-            odom_from_robot: Pose2::identity(),
-            run_from_robot: keyframe.run_from_robot,
-            motion_covariance: keyframe.motion_covariance,
-            ranges_m: Vec::new(),
-        })
-        .collect();
-    let poses = map.poses(map_run).await?;
-    let mapped = MappedRun {
-        component: map_run.component,
-        map_from_keyframes: poses.iter().map(|pose| pose.map_from_robot).collect(),
-    };
+    let trajectory = map.trajectory(map_run).await?;
+    let component = map_run.component;
     on_blocking_thread(move || {
         let placed: Vec<Pose2> = observations
             .iter()
-            .map_while(|there| place_in_map(&keyframes, &mapped, there.scan_seq, &there.run_from_robot))
+            .map_while(|there| trajectory.at(there.scan_seq, &there.run_from_robot))
             .collect();
         let known = &observations[..placed.len()];
-        builder.add_run(known, PlacedDrive { component: mapped.component, map_from_observations: placed });
+        builder.add_run(known, PlacedDrive { component, map_from_observations: placed });
         builder
     })
     .await

@@ -6,4 +6,4 @@ mod words;
 
 pub use examples::{ExampleInfo, ExamplePlace, PlaceIndexes};
 pub use localizations::{LocalizationInfo, Localizations, LocatedHypothesis};
-pub use words::{WordAnswer, WordPattern, find_words};
+pub use words::{WordAnswer, find_words};

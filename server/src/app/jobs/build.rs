@@ -9,9 +9,10 @@ use locution_engine::mapping::{
     Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
     SiteMap, map_site, weigh_texts,
 };
+use locution_engine::semantics::MapLabels;
 use locution_engine::text::{Observation, Word};
 
-use crate::app::maps::{LabeledMap, WrittenRun, holds_for, label_map, serve_map, write_map};
+use crate::app::maps::{WrittenRun, serve_map, write_map};
 use crate::app::site::{Progress, Site};
 use crate::app::{App, AppError, on_blocking_thread};
 use crate::records::{JobKind, Run};
@@ -117,7 +118,7 @@ fn written_run(run: &LoadedRun) -> WrittenRun {
 /// A vetoed pair of places that the map no longer brings together stays listed, so that it can be taken back.
 fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
     for decision in decisions.iter().filter(|decision| !decision.is_same_place) {
-        if map.matches.iter().any(|found| holds_for(decision, found)) {
+        if map.matches.iter().any(|found| decision.is_about(found)) {
             continue;
         }
         map.matches.push(PlaceMatch {
@@ -138,11 +139,11 @@ async fn map_runs(
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
-) -> Result<(SiteMap, LabeledMap), AppError> {
+) -> Result<(SiteMap, MapLabels), AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
-        let labels = LabeledMap { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+        let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
         return Ok((map, labels));
     }
     let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
@@ -152,7 +153,7 @@ async fn map_runs(
             weigh_texts(&records, &mut map, &config.matching);
             map.matches.append(&mut map.refused);
             keep_vetoed_visible(&mut map, &decisions);
-            let labels = label_map(&records, &map, &config.semantics);
+            let labels = MapLabels::of(&records, &map, &config.semantics);
             (map, labels)
         });
         (memo, outcome)

@@ -1,7 +1,7 @@
 //! What changed between the runs of two sessions, as the engine compares them at their map poses.
 
 use locution_engine::geometry::{Point2, Pose2};
-use locution_engine::mapping::{Change, Keyframe, MappedRun, PlacedRun, find_changes, place_in_map};
+use locution_engine::mapping::{Change, Keyframe, PlacedRun, find_changes};
 use locution_engine::scan::ScanGeometry;
 
 use crate::app::site::Site;
@@ -94,18 +94,17 @@ impl LoadedRun {
         // What was sent after the map was built has no place in it.
         keyframes.truncate(poses.len());
         let observations = run.all_observations().await?;
-        let mapped = MappedRun { component: map_run.component, map_from_keyframes: poses };
+        let trajectory = map.trajectory(map_run).await?;
         let densities = observations
             .iter()
             .filter(|observation| observation.scan_seq < map_run.num_scans)
             .filter_map(|observation| {
-                let pose =
-                    place_in_map(&keyframes, &mapped, observation.scan_seq, &observation.run_from_robot)?;
+                let pose = trajectory.at(observation.scan_seq, &observation.run_from_robot)?;
                 Some((pose.position(), *observation.densities.first()?))
             })
             .collect();
         let geometry = run.record.geometry.clone();
-        Ok(Self { geometry, keyframes, poses: mapped.map_from_keyframes, densities })
+        Ok(Self { geometry, keyframes, poses, densities })
     }
 
     fn as_placed(&self) -> PlacedRun<'_> {

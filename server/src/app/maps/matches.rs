@@ -3,7 +3,7 @@
 //! Matches belong to a map version and are numbered within it. A decision belongs to the pair of places: it holds for
 //! every match, of this version and of those to come, whose two stretches of driving overlap the two it was made on.
 
-use locution_engine::mapping::{Channel, Decision, Direction, Interval, MatchState, PlaceMatch};
+use locution_engine::mapping::{Channel, Decision, Direction, MatchState, PlaceMatch};
 
 use crate::app::AppError;
 use crate::app::site::Site;
@@ -60,7 +60,8 @@ impl MatchFilter {
         Self { state: Some(MatchStateKind::Verified), ..Self::default() }
     }
 
-    fn accepts(&self, found: &PlaceMatch) -> bool {
+    /// Whether a match is one of them.
+    pub fn accepts(&self, found: &PlaceMatch) -> bool {
         self.state.is_none_or(|state| state == MatchStateKind::from(&found.state))
             && self.channel.is_none_or(|channel| channel == found.channel)
             && self.direction.is_none_or(|direction| direction == found.direction)
@@ -140,7 +141,7 @@ pub async fn undecide(site: &Site, found: &PlaceMatch) -> Result<(), AppError> {
 /// Numbers of the decisions on a pair of places.
 async fn decisions_on(site: &Site, found: &PlaceMatch) -> Result<Vec<u64>, AppError> {
     let decisions = site.reader().decisions().await?;
-    let on_it = decisions.into_iter().filter(|(_, decision)| holds_for(decision, found));
+    let on_it = decisions.into_iter().filter(|(_, decision)| decision.is_about(found));
     Ok(on_it.map(|(number, _)| number).collect())
 }
 
@@ -149,16 +150,5 @@ async fn decisions(map: &Map) -> Result<Vec<Decision>, AppError> {
 }
 
 fn decision_on(decisions: &[Decision], found: &PlaceMatch) -> Option<bool> {
-    decisions.iter().rev().find(|decision| holds_for(decision, found)).map(|decision| decision.is_same_place)
-}
-
-/// Whether a decision was made on the pair of places of a match.
-pub fn holds_for(decision: &Decision, found: &PlaceMatch) -> bool {
-    decision.direction == found.direction
-        && overlap(&decision.earlier, &found.earlier)
-        && overlap(&decision.later, &found.later)
-}
-
-fn overlap(a: &Interval, b: &Interval) -> bool {
-    a.run_idx == b.run_idx && a.first <= b.last && b.first <= a.last
+    decisions.iter().rev().find(|decision| decision.is_about(found)).map(|decision| decision.is_same_place)
 }

@@ -12,10 +12,8 @@ mod write;
 pub use changes::{NoSessions, Sessions};
 pub use exports::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
 pub use grids::GridKey;
-pub use labels::{LabelAnswer, LabelPattern, LabeledMap, LabeledStretch, find_labels, label_map, labels};
-pub use matches::{
-    MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, holds_for, matches, undecide,
-};
+pub use labels::{DrivenStretch, LabelAnswer, find_labels, labels};
+pub use matches::{MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide};
 pub use places::{find_route, places};
-pub use regions::{Region, Topology, pose_at, topology};
+pub use regions::{Topology, topology};
 pub use write::{WrittenRun, serve_map, write_map};

@@ -3,12 +3,12 @@
 //! A region is a word of level 0 placed in the map. Regions that follow one another in a run are connected; so are two
 //! regions that a verified match says are the same place.
 
-use locution_engine::geometry::{Pose2, wrap_angle};
+use locution_engine::geometry::Pose2;
 use locution_engine::mapping::Interval;
 
 use super::matches::{MatchFilter, matches};
 use crate::app::AppError;
-use crate::records::{Map, MapPose, PlacedRun};
+use crate::records::{Map, PlacedRun};
 
 /// A word placed in the map.
 #[derive(Clone, Debug)]
@@ -70,16 +70,19 @@ pub async fn topology(map: &Map, runs: &[PlacedRun]) -> Result<Topology, AppErro
 async fn regions_of(placed: &PlacedRun) -> Result<Vec<Region>, AppError> {
     let words = placed.run.words(0, 0, usize::MAX).await?;
     let observations = placed.run.all_observations().await?;
+    let trajectory = placed.trajectory().await?;
     let mut regions = Vec::new();
     for word in words {
         let (first, last) = (word.observations.0 as usize, word.observations.1 as usize);
         let Some(stretch) = observations.get(first..=last).filter(|stretch| !stretch.is_empty()) else {
             continue;
         };
+        let middle = &stretch[stretch.len() / 2];
         // The run may have gone on since the map was built.
-        let Some(map_from_middle) = pose_at(&placed.poses, stretch[stretch.len() / 2].scan_seq) else {
+        if middle.scan_seq >= placed.map_run.num_scans {
             break;
-        };
+        }
+        let Some(map_from_middle) = trajectory.at(middle.scan_seq, &middle.run_from_robot) else { break };
         regions.push(Region {
             run: placed.map_run.run,
             component: placed.map_run.component,
@@ -101,35 +104,4 @@ fn region_at(regions: &[Region], stretch: &Interval) -> Option<usize> {
         regions.partition_point(|region| (region.run, region.observations.1) < (stretch.run_idx, middle));
     let region = regions.get(before)?;
     (region.run == stretch.run_idx && region.observations.0 <= middle).then_some(before)
-}
-
-/// The pose at a scan, between the keyframes around it; `None` after the last.
-pub fn pose_at(poses: &[MapPose], scan_seq: u64) -> Option<Pose2> {
-    let after = poses.partition_point(|pose| pose.scan_seq < scan_seq);
-    let next = poses.get(after)?;
-    let Some(previous) = after.checked_sub(1).map(|idx| &poses[idx]) else {
-        return Some(next.map_from_robot);
-    };
-    let share = (scan_seq - previous.scan_seq) as f64 / (next.scan_seq - previous.scan_seq) as f64;
-    let (from, to) = (previous.map_from_robot, next.map_from_robot);
-    Some(Pose2::new(
-        from.x + share * (to.x - from.x),
-        from.y + share * (to.y - from.y),
-        from.theta + share * wrap_angle(to.theta - from.theta),
-    ))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn poses_between_keyframes_are_interpolated() {
-        let pose = |scan_seq, x| MapPose { scan_seq, map_from_robot: Pose2::new(x, 0.0, 0.0) };
-        let poses = [pose(2, 1.0), pose(6, 3.0)];
-        assert_eq!(pose_at(&poses, 0).unwrap().x, 1.0);
-        assert_eq!(pose_at(&poses, 3).unwrap().x, 1.5);
-        assert_eq!(pose_at(&poses, 6).unwrap().x, 3.0);
-        assert_eq!(pose_at(&poses, 7), None);
-    }
 }

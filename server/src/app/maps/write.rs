@@ -1,12 +1,12 @@
 //! Map versions: written whole into fresh keys, then served; kept for a while, asked for by number.
 
 use locution_engine::mapping::{MatchState, SiteMap};
+use locution_engine::semantics::MapLabels;
 
-use super::labels::LabeledMap;
 use crate::app::AppError;
 use crate::app::site::Site;
 use crate::records::{
-    Key, Map, MapPose, MapRecord, MapRun, MapVersion, PartKind, RunIdx, append_places, codec,
+    Key, Map, MapPose, MapRecord, MapRun, MapVersion, PartKind, RunIdx, StoredLabel, append_places, codec,
     delete_prefixes, match_chunks, series,
 };
 use crate::storage::{Batch, SiteStore, StorageError};
@@ -33,7 +33,7 @@ pub struct WrittenRun {
 pub async fn write_map(
     site: &Site,
     map: &SiteMap,
-    labeled: &LabeledMap,
+    labeled: &MapLabels,
     runs: &[WrittenRun],
     duration_s: f64,
 ) -> Result<Map, AppError> {
@@ -60,7 +60,8 @@ pub async fn write_map(
             .map(|(scan_seq, pose)| MapPose { scan_seq: *scan_seq, map_from_robot: *pose })
             .collect();
         series::append(&mut batch, &poses, first_pose, |n| Key::MapPart(version, PartKind::Poses, n));
-        series::append(&mut batch, labels, first_label, |n| Key::MapPart(version, PartKind::Labels, n));
+        let labels: Vec<StoredLabel> = labels.iter().map(StoredLabel::from).collect();
+        series::append(&mut batch, &labels, first_label, |n| Key::MapPart(version, PartKind::Labels, n));
         let steps = poses.windows(2).map(|two| two[0].map_from_robot.distance(&two[1].map_from_robot));
         record.runs.push(MapRun {
             run: written.run,

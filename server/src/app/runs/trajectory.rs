@@ -1,10 +1,9 @@
 //! A pose for every scan, in the frame asked for.
 //!
-//! The engine knows poses at some scans only (keyframes). Between two of them the odometry is carried on from the
-//! earlier, and what is left over at the later is spread linearly over the scans between; beyond the ends the odometry
-//! is carried on as it is.
+//! Poses are known at some scans only (keyframes); `RunTrajectory` says how odometry fills what lies between.
 
-use locution_engine::geometry::{Pose2, wrap_angle};
+use locution_engine::geometry::Pose2;
+use locution_engine::recording::{PlacedKeyframe, RunTrajectory};
 
 use crate::app::AppError;
 use crate::app::site::Site;
@@ -53,7 +52,8 @@ pub async fn trajectory(
 ) -> Result<Trajectory, AppError> {
     let stamps = run.stamps().await?;
     let mut component = None;
-    let anchors = match frame {
+    // Poses that are known in the frame, by the sequence numbers of their scans.
+    let known: Vec<(u64, Pose2)> = match frame {
         Frame::Odom => Vec::new(),
         Frame::Run => {
             let keyframes = run.stored_keyframes().await?;
@@ -72,52 +72,21 @@ pub async fn trajectory(
             poses.iter().map(|pose| (pose.scan_seq, pose.map_from_robot)).collect()
         }
     };
-    Ok(Trajectory { component, poses: spread(&stamps, &anchors) })
+    Ok(Trajectory { component, poses: spread(&stamps, &known) })
 }
 
-/// A pose for every scan from odometry and the known poses of some scans, in order of their sequence numbers.
-pub fn spread(stamps: &[(i64, Pose2)], anchors: &[(u64, Pose2)]) -> Vec<StampedPose> {
-    let mut poses = Vec::with_capacity(stamps.len());
-    let mut next_anchor = 0;
-    for (scan_idx, &(timestamp_ns, odom_from_robot)) in stamps.iter().enumerate() {
-        let scan_seq = scan_idx as u64;
-        while anchors.get(next_anchor).is_some_and(|(anchor_seq, _)| *anchor_seq <= scan_seq) {
-            next_anchor += 1;
-        }
-        let before = next_anchor.checked_sub(1).map(|idx| anchors[idx]);
-        let after = anchors.get(next_anchor).copied();
-        let frame_from_robot = match (before, after) {
-            (None, None) => odom_from_robot,
-            (Some(anchor), None) | (None, Some(anchor)) => carry(stamps, anchor, odom_from_robot),
-            (Some(before), Some(after)) => between(stamps, before, after, scan_seq, odom_from_robot),
-        };
-        poses.push(StampedPose { scan_seq, timestamp_ns, frame_from_robot });
-    }
-    poses
-}
-
-/// The anchor moved on by odometry.
-fn carry(stamps: &[(i64, Pose2)], anchor: (u64, Pose2), odom_from_robot: Pose2) -> Pose2 {
-    let Some((_, odom_from_anchor)) = stamps.get(anchor.0 as usize) else { return anchor.1 };
-    anchor.1.compose(&odom_from_anchor.between(&odom_from_robot))
-}
-
-fn between(
-    stamps: &[(i64, Pose2)],
-    before: (u64, Pose2),
-    after: (u64, Pose2),
-    scan_seq: u64,
-    odom_from_robot: Pose2,
-) -> Pose2 {
-    let Some((_, odom_at_after)) = stamps.get(after.0 as usize) else { return before.1 };
-    let carried = carry(stamps, before, odom_from_robot);
-    let carried_after = carry(stamps, before, *odom_at_after);
-    let share = (scan_seq - before.0) as f64 / (after.0 - before.0) as f64;
-    Pose2::new(
-        carried.x + share * (after.1.x - carried_after.x),
-        carried.y + share * (after.1.y - carried_after.y),
-        carried.theta + share * wrap_angle(after.1.theta - carried_after.theta),
-    )
+/// A pose for every scan, from odometry and the poses of some scans.
+fn spread(stamps: &[(i64, Pose2)], known: &[(u64, Pose2)]) -> Vec<StampedPose> {
+    let placed = known.iter().filter_map(|&(scan_seq, map_from_robot)| {
+        let (_, run_from_robot) = *stamps.get(usize::try_from(scan_seq).ok()?)?;
+        Some(PlacedKeyframe { scan_seq, run_from_robot, map_from_robot })
+    });
+    let run: RunTrajectory = placed.collect();
+    let pose = |(scan_seq, &(timestamp_ns, odom_from_robot)): (u64, &(i64, Pose2))| {
+        let frame_from_robot = run.at(scan_seq, &odom_from_robot).unwrap_or(odom_from_robot);
+        StampedPose { scan_seq, timestamp_ns, frame_from_robot }
+    };
+    (0..).zip(stamps).map(pose).collect()
 }
 
 #[cfg(test)]
@@ -129,21 +98,17 @@ mod tests {
     }
 
     #[test]
-    fn without_anchors_odometry_is_served() {
+    fn without_known_poses_odometry_is_served() {
         let stamps = straight(3);
         let poses = spread(&stamps, &[]);
         assert!(poses.iter().zip(&stamps).all(|(pose, stamp)| pose.frame_from_robot == stamp.1));
     }
 
     #[test]
-    fn anchors_are_kept_and_the_rest_is_spread() {
-        let stamps = straight(6);
-        let anchors = [(1, Pose2::new(0.0, 0.0, 0.0)), (3, Pose2::new(2.0, 1.0, 0.0))];
-        let poses: Vec<Pose2> = spread(&stamps, &anchors).iter().map(|pose| pose.frame_from_robot).collect();
-        assert_eq!(poses[0], Pose2::new(-1.0, 0.0, 0.0));
-        assert_eq!(poses[1], anchors[0].1);
-        assert_eq!(poses[2], Pose2::new(1.0, 0.5, 0.0));
-        assert_eq!(poses[3], anchors[1].1);
-        assert_eq!(poses[5], Pose2::new(4.0, 1.0, 0.0));
+    fn every_scan_has_a_pose_with_its_number_and_time() {
+        let poses = spread(&straight(4), &[(1, Pose2::new(5.0, 0.0, 0.0))]);
+        let told: Vec<_> = poses.iter().map(|pose| (pose.scan_seq, pose.timestamp_ns)).collect();
+        assert_eq!(told, [(0, 0), (1, 1), (2, 2), (3, 3)]);
+        assert_eq!(poses[3].frame_from_robot, Pose2::new(7.0, 0.0, 0.0));
     }
 }

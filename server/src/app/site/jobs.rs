@@ -209,3 +209,75 @@ fn info(record: &JobRecord, progress: &Progress) -> JobInfo {
     }
     JobInfo { record, progress: share }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::storage::{MemoryStorage, Storage};
+
+    fn job(id: u64, state: JobState, num_attempts: u32) -> JobRecord {
+        JobRecord { id, kind: JobKind::Build, state, num_attempts, detail: String::new(), error: None }
+    }
+
+    async fn stored(jobs: &[JobRecord]) -> Arc<dyn SiteStore> {
+        let store = MemoryStorage::default().open("site").await.unwrap();
+        let mut batch = Batch::default();
+        jobs.iter().for_each(|job| batch.put(Key::Job(job.id).encode(), codec::encode(job)));
+        store.commit(batch, vec![]).await.unwrap();
+        store
+    }
+
+    fn states(jobs: &Jobs) -> Vec<(u64, JobState)> {
+        jobs.all().iter().map(|job| (job.record.id, job.record.state)).collect()
+    }
+
+    #[tokio::test]
+    async fn what_was_interrupted_begins_anew_until_it_was_interrupted_too_often() {
+        let store = stored(&[
+            job(1, JobState::Done, 1),
+            job(2, JobState::Running, NUM_ATTEMPTS_MAX),
+            job(3, JobState::Running, 1),
+            job(4, JobState::Queued, 0),
+        ])
+        .await;
+        let expected =
+            [(4, JobState::Queued), (3, JobState::Queued), (2, JobState::Failed), (1, JobState::Done)];
+        let jobs = Jobs::load(&*store).await.unwrap();
+        assert_eq!(states(&jobs), expected);
+        assert!(jobs.get(2).unwrap().record.error.unwrap().contains("interrupted 3 times"));
+        assert_eq!(states(&Jobs::load(&*store).await.unwrap()), expected, "it is stored, too");
+    }
+
+    #[tokio::test]
+    async fn jobs_are_worked_on_by_one_and_in_order() {
+        let store = stored(&[job(7, JobState::Queued, 0), job(8, JobState::Queued, 0)]).await;
+        let jobs = Jobs::load(&*store).await.unwrap();
+        assert!(jobs.begin_work());
+        assert!(!jobs.begin_work(), "somebody works already");
+        for id in [7, 8] {
+            let (mut next, _) = jobs.next().unwrap();
+            assert_eq!(next.id, id);
+            next.state = JobState::Done;
+            jobs.store(&*store, &next).await.unwrap();
+        }
+        assert!(jobs.next().is_none());
+        assert!(!jobs.begin_work(), "nothing is left to do");
+        jobs.insert(job(9, JobState::Queued, 0));
+        assert!(jobs.begin_work());
+    }
+
+    #[tokio::test]
+    async fn the_oldest_of_too_many_ended_jobs_are_forgotten_and_no_others() {
+        let mut all = vec![job(1, JobState::Queued, 0)];
+        all.extend((2..=NUM_ENDED_KEPT as u64 + 2).map(|id| job(id, JobState::Done, 1)));
+        let store = stored(&all).await;
+        let jobs = Jobs::load(&*store).await.unwrap();
+        let newest = job(NUM_ENDED_KEPT as u64 + 3, JobState::Done, 1);
+        jobs.insert(newest.clone());
+        jobs.store(&*store, &newest).await.unwrap();
+        assert_eq!(jobs.all().len(), NUM_ENDED_KEPT);
+        assert!(jobs.get(1).is_ok(), "it waits");
+        assert!(jobs.get(2).is_err() && jobs.get(newest.id).is_ok());
+        assert_eq!(states(&Jobs::load(&*store).await.unwrap()), states(&jobs));
+    }
+}
