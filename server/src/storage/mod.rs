@@ -18,12 +18,9 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use thiserror::Error;
 
-pub mod codec;
 #[cfg(test)]
 mod contract;
-pub mod keys;
 mod memory;
-pub mod scan_chunk;
 mod sled_flusher;
 mod sled_store;
 
