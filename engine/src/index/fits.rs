@@ -8,7 +8,7 @@ use super::occurrence::OccurrenceIndex;
 use super::pattern::{TextQuery, WordConstraint};
 use super::reading::TextReading;
 use super::tolerance::Syllables;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::geometry::wrap_angle;
 use crate::text::{Direction, Interval};
 
