@@ -1,6 +1,6 @@
 //! Forgetting what stands under a prefix.
 
-use crate::storage::{Batch, Reader as _, SiteStore, StorageError};
+use crate::storage::{Batch, SiteStore, StorageError};
 
 /// Keys deleted in one commit.
 const NUM_KEYS_PER_DELETION: usize = 1_000;

@@ -20,10 +20,12 @@ use thiserror::Error;
 
 #[cfg(test)]
 mod contract;
+#[cfg(test)]
 mod memory;
 mod sled_flusher;
 mod sled_store;
 
+#[cfg(test)]
 pub use memory::MemoryStorage;
 pub use sled_store::{SledConfig, SledStorage};
 

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use locution_tidy::{Source, sources, workspace};
+use locution_tidy::{Source, check, sources, workspace};
 
 /// Longest source file, in lines before its tests.
 const MAX_FILE_LINES: usize = 500;
@@ -32,10 +32,6 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("labelled", "labeled"),
     ("metre", "meter"),
 ];
-
-fn check(complaints: Vec<String>) {
-    assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
-}
 
 fn forbid(sources: &[Source], words: &[&str]) -> Vec<String> {
     let mut complaints = Vec::new();

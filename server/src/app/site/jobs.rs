@@ -11,7 +11,7 @@ use tokio::sync::Notify;
 
 use crate::app::AppError;
 use crate::records::{JobKind, JobRecord, JobState, Key, codec};
-use crate::storage::{Batch, Reader as _, SiteStore};
+use crate::storage::{Batch, SiteStore};
 
 /// A job that was interrupted this often is not begun again.
 const NUM_ATTEMPTS_MAX: u32 = 3;
@@ -45,7 +45,7 @@ impl Progress {
         f64::from(self.permille.load(Ordering::Relaxed)) / 1000.0
     }
 
-    fn detail(&self) -> String {
+    pub fn detail(&self) -> String {
         self.detail.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
 }

@@ -16,7 +16,7 @@ use tokio::sync::Mutex;
 
 use crate::app::{AppError, on_blocking_thread};
 use crate::records::{Generation, Key, RunIdx, SiteReader, SiteRecord, TextHead, codec, join_pieces, pieces};
-use crate::storage::{Batch, Precondition, Reader as _, SiteStore, StorageError};
+use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 
 /// Segments are merged when the earlier one is at most so many times as large.
 const MERGE_RATIO: usize = 2;
