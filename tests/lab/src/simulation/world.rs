@@ -192,11 +192,12 @@ mod tests {
 
     #[test]
     fn a_turned_origin_turns_the_world() {
-        // A room of 4 m by 2 m in walls of one cell.
-        let (width, height) = (42, 22);
+        // A room of 4 m by 2 m in walls of one cell, with free floor around it.
+        let (width, height) = (62, 42);
         let is_wall = |cell: usize| {
             let (column, row) = (cell % width, cell / width);
-            column == 0 || row == 0 || column == width - 1 || row == height - 1
+            let is_within = (10..=51).contains(&column) && (10..=31).contains(&row);
+            is_within && (column == 10 || column == 51 || row == 10 || row == 31)
         };
         let pixels = (0..width * height).map(|cell| if is_wall(cell) { 0 } else { 254 }).collect();
         let picture = GrayImage { width, height, pixels }.into();
@@ -205,27 +206,34 @@ mod tests {
             let yaml = locution_engine::formats::parse_map_server_yaml(&text).unwrap();
             World::from_map_server(&picture, &yaml).unwrap()
         };
-        let straight = with_yaw(0.0);
-        let quarter = with_yaw(std::f64::consts::FRAC_PI_2);
-        assert_eq!(quarter.size(), (height, width));
-        for yaw in [0.3, 0.785, std::f64::consts::FRAC_PI_2, -2.0] {
-            let turned = with_yaw(yaw);
-            let origin = Point2::new(3.0, -2.0);
-            for (x, y) in [(0.3, 0.3), (2.1, 1.1), (3.9, 1.9), (4.5, 1.0), (2.0, 2.4), (-0.2, 1.0)] {
-                let unturned = Point2::new(origin.x + x, origin.y + y);
-                let point = Pose2::new(origin.x, origin.y, yaw).transform_point(&Point2::new(x, y));
-                assert_eq!(turned.is_free(&point), straight.is_free(&unturned), "{yaw}: {x}, {y}");
+        assert_eq!(with_yaw(std::f64::consts::FRAC_PI_2).size(), (height, width));
+        for yaw in [0.0, 0.3, 0.785, std::f64::consts::FRAC_PI_2, -2.0] {
+            let world = with_yaw(yaw);
+            let map_from_image = Pose2::new(3.0, -2.0, yaw);
+            for (x, y, is_free) in [
+                (1.3, 1.3, true),
+                (3.1, 2.1, true),
+                (4.9, 2.9, true),
+                (0.5, 2.0, true),
+                (3.0, 3.6, true),
+                (6.5, 1.0, false),
+                (-0.2, 1.0, false),
+            ] {
+                let point = map_from_image.transform_point(&Point2::new(x, y));
+                assert_eq!(world.is_free(&point), is_free, "{yaw}: {x}, {y}");
             }
-            // No ray leaves the room.
-            let center = Pose2::new(origin.x, origin.y, yaw).compose(&Pose2::new(2.1, 1.1, 0.0));
             for step in 0..360 {
                 let heading = f64::from(step).to_radians();
-                let along = |length_m: f64| {
-                    Point2::new(center.x + length_m * heading.cos(), center.y + length_m * heading.sin())
+                let along = |k: i32| {
+                    let length_m = 0.01 * f64::from(k);
+                    Point2::new(3.1 + length_m * heading.cos(), 2.1 + length_m * heading.sin())
                 };
-                let blocked =
-                    (0..400).map(|k| along(0.01 * f64::from(k))).any(|point| !turned.is_free(&point));
-                assert!(blocked, "{yaw} {step}");
+                let hit = (0..600)
+                    .map(along)
+                    .find(|point| !world.is_free(&map_from_image.transform_point(point)))
+                    .unwrap();
+                let beyond_walls_m = ((hit.x - 3.1).abs() - 2.1).max((hit.y - 2.1).abs() - 1.1);
+                assert!(beyond_walls_m < 0.05, "{yaw}: a ray of {step} degrees leaves the room at {hit:?}");
             }
         }
     }
