@@ -122,9 +122,6 @@ impl App {
     }
 
     /// Finishes what is under way and closes the storage.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn close(&self) -> Result<(), AppError> {
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).clear();
         Ok(self.storage.close().await?)
