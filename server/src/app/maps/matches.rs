@@ -59,8 +59,7 @@ impl MatchFilter {
         Self { state: Some(MatchStateKind::Verified), ..Self::default() }
     }
 
-    /// Whether a match is one of them.
-    pub fn accepts(&self, found: &PlaceMatch) -> bool {
+    fn accepts(&self, found: &PlaceMatch) -> bool {
         self.state.is_none_or(|state| state == MatchStateKind::from(&found.state))
             && self.channel.is_none_or(|channel| channel == found.channel)
             && self.direction.is_none_or(|direction| direction == found.direction)
