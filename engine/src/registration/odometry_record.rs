@@ -83,7 +83,6 @@ impl OdometryRecord {
         self.excess_m2 = MEMORY * self.excess_m2 + weight * length_m * (driven_m - length_m);
         let weight = share(by_scan[(2, 2)], by_prior[(2, 2)]);
         self.turn_told_m2 = MEMORY * self.turn_told_m2 + weight * length_m * length_m;
-        self.turn_excess =
-            MEMORY * self.turn_excess + weight * length_m * turned;
+        self.turn_excess = MEMORY * self.turn_excess + weight * length_m * turned;
     }
 }

@@ -32,6 +32,9 @@ pub struct KeyframeMotion {
     pub motion_covariance: [[f64; 3]; 3],
 }
 
+/// Time between scans of a robot without a clock, seconds.
+const UNTOLD_INTERVAL_S: f64 = 0.3;
+
 /// Points that a surface must rest on.
 const MIN_COUNT: i32 = 3;
 
@@ -220,7 +223,11 @@ impl OdometryRefiner {
             *usual_s += 0.05 * (gap_s.clamp(0.0, 3.0 * *usual_s) - *usual_s);
         }
         // Clocks jitter: only a gap well beyond what is usual counts as one.
-        if gap_s > 3.0 * *usual_s { gap_s } else { *usual_s }
+        match *usual_s {
+            usual_s if usual_s <= 0.0 => UNTOLD_INTERVAL_S,
+            usual_s if gap_s > 3.0 * usual_s => gap_s,
+            usual_s => usual_s,
+        }
     }
 
     fn expect(&mut self, latest: &Latest, scan: &Scan, gap_s: f64) -> Option<Expectation> {
@@ -240,8 +247,8 @@ impl OdometryRefiner {
         let motion = self.state.record.corrected(&told);
         let by_odometry = fixed.start_from_robot.compose(&motion);
         let belief = if is_possible { self.state.record.belief(&step) } else { 0.05 };
-        let covariance = fixed.covariance
-            + rotated(&config.odometry.covariance(&motion), fixed.start_from_robot.theta);
+        let covariance =
+            fixed.covariance + rotated(&config.odometry.covariance(&motion), fixed.start_from_robot.theta);
         let odometry = Witness::new(by_odometry, &covariance, belief);
         let going_on = latest.start_from_robot.compose(&onward);
         let covariance =
@@ -331,15 +338,14 @@ impl OdometryRefiner {
         if is_sound(&best) {
             return Some(best);
         }
-        let (good, min, gain) =
-            (config.good_inlier_share, config.min_inlier_share, config.min_search_gain);
+        let (good, min, gain) = (config.good_inlier_share, config.min_inlier_share, config.min_search_gain);
         let mut starts: Vec<Pose2> = expected.prior.means().collect();
         starts.push(latest.start_from_robot);
         let mut tried = vec![expected.predicted];
         for start in starts {
-            let is_new = tried.iter().all(|other| {
-                other.distance(&start) > 0.05 || (other.theta - start.theta).abs() > 0.03
-            });
+            let is_new = tried
+                .iter()
+                .all(|other| other.distance(&start) > 0.05 || (other.theta - start.theta).abs() > 0.03);
             if is_new {
                 tried.push(start);
                 let other = self.align_from(&start, points, expected);
@@ -349,7 +355,8 @@ impl OdometryRefiner {
             }
         }
         if best.inlier_share < good {
-            let half_turn_rad = if expected.is_by_odometry { config.search_half_turn_rad } else { config.lost_half_turn_rad };
+            let half_turn_rad =
+                if expected.is_by_odometry { config.search_half_turn_rad } else { config.lost_half_turn_rad };
             let start = self.search(points, &best.map_from_points, half_turn_rad)?;
             let other = self.align_from(&start, points, expected);
             if other.inlier_share > best.inlier_share + gain {
@@ -375,11 +382,8 @@ impl OdometryRefiner {
                 grid.mark(&point);
             }
         }
-        let window = LocalWindow {
-            half_x_m: config.search_half_m,
-            half_y_m: config.search_half_m,
-            half_turn_rad,
-        };
+        let window =
+            LocalWindow { half_x_m: config.search_half_m, half_y_m: config.search_half_m, half_turn_rad };
         grid.best_pose(points, predicted, &window)
     }
 
@@ -495,6 +499,86 @@ mod tests {
             assert_eq!(straight.refine(&laser(), scan), restored.refine(&laser(), scan));
         }
         assert_eq!(postcard::to_stdvec(&straight).unwrap(), postcard::to_stdvec(&restored).unwrap());
+    }
+
+    /// How far the refined poses go wrong from the first scan to any other, metres and radians.
+    fn worst_error(truth: &[Pose2], scans: &[Scan]) -> (f64, f64) {
+        let mut refiner = OdometryRefiner::new(&RefinerConfig::default());
+        let refined: Vec<Pose2> =
+            scans.iter().map(|scan| refiner.refine(&laser(), scan).run_from_robot).collect();
+        truth.iter().zip(&refined).fold((0.0, 0.0), |worst: (f64, f64), (at, found)| {
+            let error = truth[0].between(at).between(&refined[0].between(found));
+            (worst.0.max(error.x.hypot(error.y)), worst.1.max(error.theta.abs()))
+        })
+    }
+
+    /// The recording with a step put into its odometry half way, as seen from the robot there.
+    fn recording_with_step(step: &Pose2) -> (Vec<Pose2>, Vec<Scan>) {
+        let (truth, mut scans) = recording();
+        let middle = scans.len() / 2;
+        let before = scans[middle].odom_from_robot;
+        for scan in &mut scans[middle..] {
+            scan.odom_from_robot = before.compose(step).compose(&before.between(&scan.odom_from_robot));
+        }
+        (truth, scans)
+    }
+
+    #[test]
+    fn a_heading_that_turns_at_once_is_put_right_by_the_scans() {
+        for degrees in [45.0f64, 60.0, 90.0, -90.0, 180.0] {
+            let (truth, scans) = recording_with_step(&Pose2::new(0.0, 0.0, degrees.to_radians()));
+            let (place_m, turn) = worst_error(&truth, &scans);
+            assert!(place_m < 0.1 && turn < 0.02, "{degrees}°: {place_m} m, {turn} rad");
+        }
+    }
+
+    #[test]
+    fn a_position_that_steps_aside_is_put_right_by_the_scans() {
+        for (x, y) in [(0.0, 3.0), (2.0, 0.0), (-40.0, 30.0)] {
+            let (truth, scans) = recording_with_step(&Pose2::new(x, y, 0.0));
+            let (place_m, turn) = worst_error(&truth, &scans);
+            assert!(place_m < 0.1 && turn < 0.02, "({x}, {y}): {place_m} m, {turn} rad");
+        }
+    }
+
+    #[test]
+    fn odometry_that_runs_backwards_or_stands_is_overruled() {
+        for sign in [-1.0, 0.0] {
+            let (truth, clean) = recording();
+            let mut scans = clean.clone();
+            for idx in 1..scans.len() {
+                let motion = clean[idx - 1].odom_from_robot.between(&clean[idx].odom_from_robot);
+                let told = if (40..70).contains(&idx) {
+                    Pose2::new(sign * motion.x, sign * motion.y, sign.abs() * motion.theta)
+                } else {
+                    motion
+                };
+                scans[idx].odom_from_robot = scans[idx - 1].odom_from_robot.compose(&told);
+            }
+            let (place_m, turn) = worst_error(&truth, &scans);
+            assert!(place_m < 0.1 && turn < 0.02, "{sign}: {place_m} m, {turn} rad");
+        }
+    }
+
+    #[test]
+    fn without_odometry_the_laser_alone_finds_the_way() {
+        let (truth, mut scans) = recording();
+        for scan in &mut scans {
+            scan.odom_from_robot = Pose2::identity();
+        }
+        let (place_m, turn) = worst_error(&truth, &scans);
+        assert!(place_m < 0.1 && turn < 0.02, "{place_m} m, {turn} rad");
+    }
+
+    #[test]
+    fn far_from_zero_odometry_is_refined_as_well_as_near_it() {
+        let (truth, mut scans) = recording();
+        for scan in &mut scans {
+            let odom = scan.odom_from_robot;
+            scan.odom_from_robot = Pose2::new(odom.x + 691_345.0, odom.y + 5_336_921.0, odom.theta);
+        }
+        let (place_m, turn) = worst_error(&truth, &scans);
+        assert!(place_m < 0.06 && turn < 0.02, "{place_m} m, {turn} rad");
     }
 
     #[test]

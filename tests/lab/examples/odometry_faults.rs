@@ -9,14 +9,14 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use locution_engine::config::EngineConfig;
-use locution_lab::evaluation::{EstimatedPose, OdometryPose, join_truth, judge_map};
 use locution_engine::formats::{CarmenLog, CarmenOptions, parse_relations, parse_truth, read_carmen_log};
 use locution_engine::geometry::{Pose2, wrap_angle};
 use locution_engine::mapping::{Keyframe, RegistrationMemo, RunRecord, map_site};
 use locution_engine::scan::{Scan, ScanGeometry};
-use locution_lab::simulation::{OdometryFault, inject};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::{Translation, Translator};
+use locution_lab::evaluation::{EstimatedPose, OdometryPose, join_truth, judge_map};
+use locution_lab::simulation::{OdometryFault, inject};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde_json::json;
@@ -110,8 +110,7 @@ fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(usize, f64, f64)>
         next_m = travel_m[end] + 0.5;
         let start = travel_m.partition_point(|&travel| travel < travel_m[end] - WINDOW_M);
         let (from, to) = (known[start], known[end]);
-        let difference =
-            true_pose(from).between(&true_pose(to)).between(&poses[from].between(&poses[to]));
+        let difference = true_pose(from).between(&true_pose(to)).between(&poses[from].between(&poses[to]));
         errors.push((to, difference.x.hypot(difference.y), difference.theta.abs().to_degrees()));
     }
     errors
@@ -123,8 +122,7 @@ fn mapped_poses(scans: &[Scan], driven: &Driven, map_from_keyframes: &[Pose2]) -
         let first = after.saturating_sub(1);
         let before = driven.keyframes.get(first)?;
         let run = |seq: u64| driven.run_from_robot[seq as usize];
-        let moved =
-            |seq: u64| map_from_keyframes[first].compose(&run(before.scan_seq).between(&run(seq)));
+        let moved = |seq: u64| map_from_keyframes[first].compose(&run(before.scan_seq).between(&run(seq)));
         let here = moved(scan_seq as u64);
         let Some(next) = driven.keyframes.get(after).filter(|_| after > 0) else { return Some(here) };
         let (carried, known) = (moved(next.scan_seq), map_from_keyframes[after]);
@@ -185,21 +183,28 @@ fn main() -> Result<(), Failure> {
         let odometry: Vec<OdometryPose> = log
             .scans
             .iter()
-            .map(|scan| OdometryPose { timestamp_ns: scan.timestamp_ns, odom_from_robot: scan.odom_from_robot })
+            .map(|scan| OdometryPose {
+                timestamp_ns: scan.timestamp_ns,
+                odom_from_robot: scan.odom_from_robot,
+            })
             .collect();
         let truth = join_truth(&odometry, &truth);
         let cases: Vec<(String, CarmenLog, Vec<std::ops::Range<usize>>)> = if with_beams {
-            [180, 60, 30, 11].map(|beams| (format!("{beams} beams"), thinned(&log, beams), Vec::new())).to_vec()
+            [180, 60, 30, 11]
+                .map(|beams| (format!("{beams} beams"), thinned(&log, beams), Vec::new()))
+                .to_vec()
         } else {
             let case = |fault: OdometryFault| {
                 let mut case = log.clone();
-                let places =
-                    inject(&mut case.scans, fault, NUM_FAULTS, &mut ChaCha8Rng::seed_from_u64(seed));
+                let places = inject(&mut case.scans, fault, NUM_FAULTS, &mut ChaCha8Rng::seed_from_u64(seed));
                 (fault.name().to_owned(), case, places)
             };
             OdometryFault::ALL.map(case).to_vec()
         };
-        for (case, log, places) in cases.iter().filter(|(case, ..)| only.is_empty() || only.split(',').any(|part| case.contains(part))) {
+        for (case, log, places) in cases
+            .iter()
+            .filter(|(case, ..)| only.is_empty() || only.split(',').any(|part| case.contains(part)))
+        {
             let began = Instant::now();
             let driven = translate(&config, &log.geometry, &log.scans)?;
             let seconds = began.elapsed().as_secs_f64();
@@ -208,8 +213,15 @@ fn main() -> Result<(), Failure> {
             let degrees = Errors::of(errors.iter().map(|error| error.2).collect());
             print!(
                 "{name:12} {case:18} {:2} open loop {:.4} p99 {:.3} max {:6.3} m, {:.3} p99 {:.2} max {:6.2}° {:4} keyframes {:.0} scans/s",
-                places.len(), meters.mean(), meters.quantile(0.99), meters.quantile(1.0), degrees.mean(), degrees.quantile(0.99), degrees.quantile(1.0),
-                driven.keyframes.len(), log.scans.len() as f64 / seconds
+                places.len(),
+                meters.mean(),
+                meters.quantile(0.99),
+                meters.quantile(1.0),
+                degrees.mean(),
+                degrees.quantile(0.99),
+                degrees.quantile(1.0),
+                driven.keyframes.len(),
+                log.scans.len() as f64 / seconds
             );
             if verbose {
                 println!();
@@ -237,14 +249,19 @@ fn main() -> Result<(), Failure> {
                     keyframes: &driven.keyframes,
                 };
                 let map = map_site(&config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
-                let poses = map.runs.first().map_or(Vec::new(), |run| {
-                    mapped_poses(&log.scans, &driven, &run.map_from_keyframes)
-                });
+                let poses = map
+                    .runs
+                    .first()
+                    .map_or(Vec::new(), |run| mapped_poses(&log.scans, &driven, &run.map_from_keyframes));
                 let report = judge_map(&poses, &relations);
                 print!(
                     "  map {:.4} ± {:.4} m, {:.3} ± {:.3}°, {} of {} relations",
-                    report.translation_m.mean, report.translation_m.sd, report.rotation_deg.mean,
-                    report.rotation_deg.sd, report.relations, report.relations + report.skipped
+                    report.translation_m.mean,
+                    report.translation_m.sd,
+                    report.rotation_deg.mean,
+                    report.rotation_deg.sd,
+                    report.relations,
+                    report.relations + report.skipped
                 );
                 row["map"] = serde_json::to_value(report)?;
             }

@@ -181,9 +181,7 @@ fn stretches(
     let mut chosen: Vec<std::ops::Range<usize>> = Vec::new();
     while chosen.len() < num && !candidates.is_empty() {
         let stretch = candidates.swap_remove(rng.random_range(0..candidates.len()));
-        candidates.retain(|other| {
-            (times_s[other.start] - times_s[stretch.start]).abs() > 4.0 * DURATION_S
-        });
+        candidates.retain(|other| (times_s[other.start] - times_s[stretch.start]).abs() > 4.0 * DURATION_S);
         chosen.push(stretch);
     }
     chosen.sort_by_key(|stretch| stretch.start);
