@@ -14,6 +14,8 @@ mod point_to_line;
 mod points;
 mod recent_scan;
 mod refiner;
+#[cfg(test)]
+mod refiner_tests;
 mod register;
 mod submap;
 mod surface_map;

@@ -9,7 +9,9 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use locution_engine::config::EngineConfig;
-use locution_engine::formats::{CarmenLog, CarmenOptions, parse_relations, parse_truth, read_carmen_log};
+use locution_engine::formats::{
+    CarmenLog, CarmenOptions, Relation, parse_relations, parse_truth, read_carmen_log,
+};
 use locution_engine::geometry::{Pose2, wrap_angle};
 use locution_engine::mapping::{Keyframe, RegistrationMemo, RunRecord, map_site};
 use locution_engine::scan::{Scan, ScanGeometry};
@@ -84,17 +86,29 @@ impl Errors {
         values.sort_by(f64::total_cmp);
         Self(values)
     }
+
     fn mean(&self) -> f64 {
         self.0.iter().sum::<f64>() / self.0.len().max(1) as f64
     }
+
     fn quantile(&self, share: f64) -> f64 {
         let last = self.0.len().saturating_sub(1);
         self.0.get((share * last as f64) as usize).copied().unwrap_or(f64::NAN)
     }
+
+    fn to_json(&self) -> serde_json::Value {
+        json!({"mean": self.mean(), "p99": self.quantile(0.99), "max": self.quantile(1.0)})
+    }
 }
 
-/// Errors of the motion over the window, metres and degrees, one for every half metre, with the scan at its end.
-fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(usize, f64, f64)> {
+impl std::fmt::Display for Errors {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{:.4} (99 %: {:.3}, all: {:.3})", self.mean(), self.quantile(0.99), self.quantile(1.0))
+    }
+}
+
+/// Errors of the motion over the window, metres and degrees, one for every half metre.
+fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(f64, f64)> {
     let known: Vec<usize> = (0..truth.len()).filter(|&idx| truth[idx].is_some()).collect();
     let true_pose = |idx: usize| truth[idx].unwrap_or_default();
     let mut travel_m = vec![0.0];
@@ -111,7 +125,7 @@ fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(usize, f64, f64)>
         let start = travel_m.partition_point(|&travel| travel < travel_m[end] - WINDOW_M);
         let (from, to) = (known[start], known[end]);
         let difference = true_pose(from).between(&true_pose(to)).between(&poses[from].between(&poses[to]));
-        errors.push((to, difference.x.hypot(difference.y), difference.theta.abs().to_degrees()));
+        errors.push((difference.x.hypot(difference.y), difference.theta.abs().to_degrees()));
     }
     errors
 }
@@ -157,29 +171,105 @@ fn thinned(log: &CarmenLog, num_beams: usize) -> CarmenLog {
     thin
 }
 
-fn main() -> Result<(), Failure> {
-    let mut config = EngineConfig::default();
-    let (mut names, mut seed, mut with_map, mut with_beams, mut only, mut json_file) =
-        (Vec::new(), 1, false, false, String::new(), None);
-    let mut verbose = false;
+/// What to try, from the command line.
+#[derive(Default)]
+struct Options {
+    names: Vec<String>,
+    config: EngineConfig,
+    seed: u64,
+    with_map: bool,
+    with_beams: bool,
+    only: String,
+    json_file: Option<String>,
+}
+
+fn options() -> Result<Options, Failure> {
+    let mut options = Options { seed: 1, ..Options::default() };
     let mut arguments = std::env::args().skip(1);
     while let Some(argument) = arguments.next() {
         match argument.as_str() {
-            "--map" => with_map = true,
-            "--beams" => with_beams = true,
-            "--verbose" => verbose = true,
-            "--seed" => seed = arguments.next().ok_or("a seed")?.parse()?,
-            "--only" => only = arguments.next().ok_or("part of a name")?,
-            "--json" => json_file = arguments.next(),
-            _ if argument.starts_with('{') => config = serde_json::from_str(&argument)?,
-            _ => names.push(argument),
+            "--map" => options.with_map = true,
+            "--beams" => options.with_beams = true,
+            "--seed" => options.seed = arguments.next().ok_or("a seed")?.parse()?,
+            "--only" => options.only = arguments.next().ok_or("part of a name")?,
+            "--json" => options.json_file = arguments.next(),
+            _ if argument.starts_with('{') => options.config = serde_json::from_str(&argument)?,
+            _ => options.names.push(argument),
         }
     }
+    Ok(options)
+}
+
+/// A recording changed in one way.
+struct Case {
+    name: String,
+    log: CarmenLog,
+    num_faults: usize,
+}
+
+fn cases(log: &CarmenLog, options: &Options) -> Vec<Case> {
+    if options.with_beams {
+        let case =
+            |beams: usize| Case { name: format!("{beams} beams"), log: thinned(log, beams), num_faults: 0 };
+        return [180, 60, 30, 11].map(case).into();
+    }
+    let case = |fault: OdometryFault| {
+        let mut log = log.clone();
+        let mut rng = ChaCha8Rng::seed_from_u64(options.seed);
+        let places = inject(&mut log.scans, fault, NUM_FAULTS, &mut rng);
+        Case { name: fault.name().to_owned(), log, num_faults: places.len() }
+    };
+    OdometryFault::ALL.map(case).into()
+}
+
+/// Translates a case, maps it if wanted, prints what came of it, and returns the same as JSON.
+fn judge(
+    recording: &str,
+    case: &Case,
+    truth: &[Option<Pose2>],
+    relations: &[Relation],
+    options: &Options,
+) -> Result<serde_json::Value, Failure> {
+    let Case { name, log, num_faults } = case;
+    let began = Instant::now();
+    let driven = translate(&options.config, &log.geometry, &log.scans)?;
+    let scans_per_s = log.scans.len() as f64 / began.elapsed().as_secs_f64();
+    let errors = open_loop(&driven.run_from_robot, truth);
+    let meters = Errors::of(errors.iter().map(|error| error.0).collect());
+    let degrees = Errors::of(errors.iter().map(|error| error.1).collect());
+    print!("{recording:12} {name:18} {num_faults:2} faults, over {WINDOW_M} m {meters} m, {degrees}°");
+    let mut row = json!({
+        "recording": recording, "case": name, "faults": num_faults, "scans_per_s": scans_per_s,
+        "open_loop_m": meters.to_json(), "open_loop_deg": degrees.to_json(),
+    });
+    if options.with_map {
+        let record = RunRecord {
+            geometry: &log.geometry,
+            observations: &driven.observations,
+            words: &driven.words,
+            keyframes: &driven.keyframes,
+        };
+        let map = map_site(&options.config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
+        let poses = map
+            .runs
+            .first()
+            .map_or(Vec::new(), |run| mapped_poses(&log.scans, &driven, &run.map_from_keyframes));
+        let report = judge_map(&poses, relations);
+        let (place, turn) = (&report.translation_m, &report.rotation_deg);
+        print!("; map {:.4} ± {:.4} m, {:.3} ± {:.3}°", place.mean, place.sd, turn.mean, turn.sd);
+        row["map"] = serde_json::to_value(report)?;
+    }
+    println!("; {scans_per_s:.0} scans/s");
+    Ok(row)
+}
+
+fn main() -> Result<(), Failure> {
+    let options = options()?;
     let mut rows = Vec::new();
-    for name in &names {
-        let log = read_carmen_log(read_text("laser", name, "log")?.lines(), &CarmenOptions::default())?;
-        let truth = parse_truth(&read_text("laser", name, "truth").unwrap_or_default())?;
-        let relations = parse_relations(&read_text("relations", name, "relations").unwrap_or_default())?;
+    for recording in &options.names {
+        let log = read_carmen_log(read_text("laser", recording, "log")?.lines(), &CarmenOptions::default())?;
+        let truth = parse_truth(&read_text("laser", recording, "truth").unwrap_or_default())?;
+        let relations = parse_relations(&read_text("relations", recording, "relations").unwrap_or_default())?;
         let odometry: Vec<OdometryPose> = log
             .scans
             .iter()
@@ -189,87 +279,12 @@ fn main() -> Result<(), Failure> {
             })
             .collect();
         let truth = join_truth(&odometry, &truth);
-        let cases: Vec<(String, CarmenLog, Vec<std::ops::Range<usize>>)> = if with_beams {
-            [180, 60, 30, 11]
-                .map(|beams| (format!("{beams} beams"), thinned(&log, beams), Vec::new()))
-                .to_vec()
-        } else {
-            let case = |fault: OdometryFault| {
-                let mut case = log.clone();
-                let places = inject(&mut case.scans, fault, NUM_FAULTS, &mut ChaCha8Rng::seed_from_u64(seed));
-                (fault.name().to_owned(), case, places)
-            };
-            OdometryFault::ALL.map(case).to_vec()
-        };
-        for (case, log, places) in cases
-            .iter()
-            .filter(|(case, ..)| only.is_empty() || only.split(',').any(|part| case.contains(part)))
-        {
-            let began = Instant::now();
-            let driven = translate(&config, &log.geometry, &log.scans)?;
-            let seconds = began.elapsed().as_secs_f64();
-            let errors = open_loop(&driven.run_from_robot, &truth);
-            let meters = Errors::of(errors.iter().map(|error| error.1).collect());
-            let degrees = Errors::of(errors.iter().map(|error| error.2).collect());
-            print!(
-                "{name:12} {case:18} {:2} open loop {:.4} p99 {:.3} max {:6.3} m, {:.3} p99 {:.2} max {:6.2}° {:4} keyframes {:.0} scans/s",
-                places.len(),
-                meters.mean(),
-                meters.quantile(0.99),
-                meters.quantile(1.0),
-                degrees.mean(),
-                degrees.quantile(0.99),
-                degrees.quantile(1.0),
-                driven.keyframes.len(),
-                log.scans.len() as f64 / seconds
-            );
-            if verbose {
-                println!();
-                let mut worst: Vec<_> = errors.iter().collect();
-                worst.sort_by(|a, b| b.1.total_cmp(&a.1));
-                let mut shown: Vec<usize> = Vec::new();
-                for error in worst {
-                    if shown.iter().all(|&other| error.0.abs_diff(other) > 200) && shown.len() < 8 {
-                        shown.push(error.0);
-                        println!("    scan {:6} {:.3} m {:.2}°", error.0, error.1, error.2);
-                    }
-                }
-                println!("    faults {places:?}");
-            }
-            let mut row = json!({
-                "recording": name, "case": case, "faults": places.len(), "scans_per_s": log.scans.len() as f64 / seconds,
-                "open_loop_m": {"mean": meters.mean(), "p99": meters.quantile(0.99), "max": meters.quantile(1.0)},
-                "open_loop_deg": {"mean": degrees.mean(), "p99": degrees.quantile(0.99), "max": degrees.quantile(1.0)},
-            });
-            if with_map {
-                let record = RunRecord {
-                    geometry: &log.geometry,
-                    observations: &driven.observations,
-                    words: &driven.words,
-                    keyframes: &driven.keyframes,
-                };
-                let map = map_site(&config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
-                let poses = map
-                    .runs
-                    .first()
-                    .map_or(Vec::new(), |run| mapped_poses(&log.scans, &driven, &run.map_from_keyframes));
-                let report = judge_map(&poses, &relations);
-                print!(
-                    "  map {:.4} ± {:.4} m, {:.3} ± {:.3}°, {} of {} relations",
-                    report.translation_m.mean,
-                    report.translation_m.sd,
-                    report.rotation_deg.mean,
-                    report.rotation_deg.sd,
-                    report.relations,
-                    report.relations + report.skipped
-                );
-                row["map"] = serde_json::to_value(report)?;
-            }
-            println!();
-            rows.push(row);
+        let is_wanted = |case: &Case| options.only.split(',').any(|part| case.name.contains(part));
+        for case in cases(&log, &options).iter().filter(|case| is_wanted(case)) {
+            rows.push(judge(recording, case, &truth, &relations, &options)?);
         }
     }
-    if let Some(file) = json_file {
+    if let Some(file) = &options.json_file {
         std::fs::write(file, serde_json::to_string_pretty(&rows)?)?;
     }
     Ok(())
