@@ -326,11 +326,29 @@ impl RefinerConfig {
             ("correlated_returns", self.correlated_returns),
             ("search_cell_m", self.search_cell_m),
             ("search_radius_m", self.search_radius_m),
+            ("check_chi2", self.check_chi2),
+            ("sound_chi2", self.sound_chi2),
+            ("motion.speed_max_m_per_s", self.motion.speed_max_m_per_s),
+            ("motion.turn_speed_max_rad_per_s", self.motion.turn_speed_max_rad_per_s),
+            ("motion.acceleration_m_per_s2", self.motion.acceleration_m_per_s2),
+            ("motion.turn_acceleration_rad_per_s2", self.motion.turn_acceleration_rad_per_s2),
+            ("motion.floor_m", self.motion.floor_m),
+            ("motion.floor_rad", self.motion.floor_rad),
         ];
         for (field, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
             }
+        }
+        for (field, value) in
+            [("lie_probability", self.lie_probability), ("recovery_probability", self.recovery_probability)]
+        {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must lie between 0 and 1"));
+            }
+        }
+        if self.num_check_points == 0 {
+            return Err(ConfigError::new(format!("{path}.num_check_points"), "must be positive"));
         }
         if self.range_limit_m > RANGE_LIMIT_MAX_M {
             let problem = format!("must be at most {RANGE_LIMIT_MAX_M}");

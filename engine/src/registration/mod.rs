@@ -1,7 +1,8 @@
 //! Registration: where does this scan, or this neighbourhood, lie in that one (SPEC section 4)?
 //!
-//! [`OdometryRefiner`] matches scans against the recent dozen metres and hands out keyframes. Everything rests on
-//! two parts: a correlative search that finds the right valley, and point-to-line steps that find its bottom.
+//! [`OdometryRefiner`] matches scans against the recent dozen metres and hands out keyframes; odometry is one witness
+//! among others to it. Everything rests on two parts: a correlative search that finds the right valley, and point-to-line
+//! steps that find its bottom.
 
 mod area;
 mod branch_and_bound;
