@@ -339,6 +339,8 @@ impl OdometryRefiner {
             return Some(best);
         }
         let (good, min, gain) = (config.good_inlier_share, config.min_inlier_share, config.min_search_gain);
+        let half_turn_rad =
+            if expected.is_by_odometry { config.search_half_turn_rad } else { config.lost_half_turn_rad };
         let mut starts: Vec<Pose2> = expected.prior.means().collect();
         starts.push(latest.start_from_robot);
         let mut tried = vec![expected.predicted];
@@ -355,8 +357,6 @@ impl OdometryRefiner {
             }
         }
         if best.inlier_share < good {
-            let half_turn_rad =
-                if expected.is_by_odometry { config.search_half_turn_rad } else { config.lost_half_turn_rad };
             let start = self.search(points, &best.map_from_points, half_turn_rad)?;
             let other = self.align_from(&start, points, expected);
             if other.inlier_share > best.inlier_share + gain {
