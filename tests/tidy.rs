@@ -158,7 +158,7 @@ fn the_storage_engine_stays_behind_its_trait() {
 fn use_cases_and_storage_know_no_http() {
     let mut inner = sources("server/src/app");
     inner.extend(sources("server/src/storage"));
-    check(forbid(&inner, &["axum::", "crate::handlers"]));
+    check(forbid(&inner, &["axum::", "crate::http"]));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The Locution server: HTTP in front of the engine, with storage underneath.
 //!
 //! ```text
-//! router ─► handlers ─► dto (checks) ─► app (use cases) ─► engine (pure) and storage (ordered bytes)
+//! http (routes, checks) ─► app (use cases) ─► engine (pure) and storage (ordered bytes)
 //! ```
 //!
 //! [`start_server`] puts the parts together; the binary and every test call it.
@@ -21,11 +21,9 @@ pub mod app;
 pub mod auth;
 pub mod cli;
 pub mod config;
-pub mod dto;
 pub mod error;
 pub mod extract;
-pub mod handlers;
-pub mod openapi;
+pub mod http;
 pub mod picture;
 pub mod router;
 pub mod state;
