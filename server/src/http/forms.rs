@@ -8,7 +8,7 @@ use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use locution_engine::formats::{GrayImage, write_pgm};
-use locution_engine::localization::{CellState, GridMap};
+use locution_engine::occupancy::{CellState, GridMap};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

@@ -4,7 +4,7 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use axum::{Extension, Json};
-use locution_engine::localization::LocalizationState;
+use locution_engine::locate::LocalizationState;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
