@@ -34,7 +34,7 @@ use node::Node;
         (name = "texts", description = "What a run became: observations, words, poses"),
         (name = "jobs", description = "Long work: builds of maps"),
         (name = "maps", description = "Maps, their versions and forms, and the matches that hold them together"),
-        (name = "localisation", description = "Where am I, and where was this recorded"),
+        (name = "localization", description = "Where am I, and where was this recorded"),
         (name = "operations", description = "Health, readiness, metrics"),
     )
 )]

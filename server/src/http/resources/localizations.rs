@@ -220,7 +220,7 @@ impl From<ExamplePlace> for ExamplePlaceDto {
 }
 
 /// Open a localisation in the serving map; nothing of it is stored.
-#[utoipa::path(post, path = "/v1/sites/{site}/localisations", operation_id = "open_localisation", tag = "localisation",
+#[utoipa::path(post, path = "/v1/sites/{site}/localisations", operation_id = "open_localization", tag = "localization",
     request_body = NewLocalizationDto,
     responses((status = 201, description = "The localisation is open", body = LocalizationDto,
             headers(("Location" = String, description = "The localisation"))),
@@ -237,7 +237,7 @@ pub async fn open_localization(
 }
 
 /// The answer as it stands.
-#[utoipa::path(get, path = "/v1/sites/{site}/localisations/{id}", operation_id = "get_localisation", tag = "localisation",
+#[utoipa::path(get, path = "/v1/sites/{site}/localisations/{id}", operation_id = "get_localization", tag = "localization",
     responses((status = 200, description = "The localisation", body = LocalizationDto)))]
 pub async fn get_localization(
     State(state): State<AppState>,
@@ -248,7 +248,7 @@ pub async fn get_localization(
 }
 
 /// Feed scans, in the batches of a run, and get the answer after them.
-#[utoipa::path(post, path = "/v1/sites/{site}/localisations/{id}/batches", operation_id = "append_localisation_batch", tag = "localisation",
+#[utoipa::path(post, path = "/v1/sites/{site}/localisations/{id}/batches", operation_id = "append_localization_batch", tag = "localization",
     request_body(content((BatchDto = "application/json"), (BatchDto = "application/cbor"))),
     responses((status = 200, description = "The answer after these scans", body = LocalizationDto),
         (status = 409, description = "The batch does not continue the localisation; `expected_sequence` says what does")))]
@@ -263,7 +263,7 @@ pub async fn localize(
 }
 
 /// Close a localisation.
-#[utoipa::path(delete, path = "/v1/sites/{site}/localisations/{id}", operation_id = "close_localisation", tag = "localisation",
+#[utoipa::path(delete, path = "/v1/sites/{site}/localisations/{id}", operation_id = "close_localization", tag = "localization",
     responses((status = 204, description = "It is closed")))]
 pub async fn close_localization(
     State(state): State<AppState>,
@@ -275,7 +275,7 @@ pub async fn close_localization(
 }
 
 /// Where in the site was this recorded? The example is not stored.
-#[utoipa::path(post, path = "/v1/sites/{site}/queries/example", operation_id = "query_example", tag = "localisation",
+#[utoipa::path(post, path = "/v1/sites/{site}/queries/example", operation_id = "query_example", tag = "localization",
     request_body(content((ExampleQueryDto = "application/json"), (ExampleQueryDto = "application/cbor"))),
     responses((status = 200, description = "Where the recording ends in this site, or that it does not", body = ExampleAnswerDto),
         (status = 409, description = "No map has been built yet")))]
@@ -292,7 +292,7 @@ pub async fn query_example(
 }
 
 /// Where was this recorded, of all sites that the key may see? Sites without a map are passed over.
-#[utoipa::path(post, path = "/v1/queries/example", operation_id = "query_example_everywhere", tag = "localisation",
+#[utoipa::path(post, path = "/v1/queries/example", operation_id = "query_example_everywhere", tag = "localization",
     request_body(content((ExampleQueryDto = "application/json"), (ExampleQueryDto = "application/cbor"))),
     responses((status = 200, description = "An answer for each site, the likeliest first", body = Vec<ExampleAnswerDto>)))]
 pub async fn query_example_everywhere(
