@@ -23,7 +23,7 @@ use crate::http::values::PoseDto;
 use crate::state::AppState;
 
 /// The map that a request means, and what the client already has of it.
-pub(super) struct MapAt {
+pub struct MapAt {
     state: AppState,
     pub(super) site: Arc<Site>,
     pub(super) map: MapRecord,
@@ -70,7 +70,7 @@ impl MapAt {
 
 /// An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub(super) struct GridDto {
+pub struct GridDto {
     /// Where and how large.
     pub info: GridInfoDto,
     /// Row by row from the lower left: 0 free, 100 occupied, −1 unknown.
@@ -79,7 +79,7 @@ pub(super) struct GridDto {
 
 /// `nav_msgs/MapMetaData`.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
-pub(super) struct GridInfoDto {
+pub struct GridInfoDto {
     /// Metres per cell.
     pub resolution: f64,
     /// Cells.
@@ -139,7 +139,7 @@ fn gray_png(image: &GrayImage) -> Result<Vec<u8>, png::EncodingError> {
 #[utoipa::path(get, path = "/v1/sites/{site}/map/grid", operation_id = "get_grid", tag = "maps", params(MapParams),
     responses((status = 200, description = "The grid", body = GridDto),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_grid(at: MapAt) -> Result<Json<GridDto>, ApiError> {
+pub async fn get_grid(at: MapAt) -> Result<Json<GridDto>, ApiError> {
     let grid = at.grid().await?;
     Ok(Json(on_blocking_thread(move || GridDto::from(&*grid)).await?))
 }
@@ -150,7 +150,7 @@ pub(super) async fn get_grid(at: MapAt) -> Result<Json<GridDto>, ApiError> {
     responses((status = 200, description = "The grid", content_type = "image/x-portable-graymap"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_grid_pgm(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_grid_pgm(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
         let grid = at.grid().await?;
         Ok(on_blocking_thread(move || write_pgm(&gray_image(&grid))).await?)
@@ -164,7 +164,7 @@ pub(super) async fn get_grid_pgm(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "The grid", content_type = "image/png"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_grid_png(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_grid_png(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
         let grid = at.grid().await?;
         let png = on_blocking_thread(move || gray_png(&gray_image(&grid))).await?;
@@ -179,7 +179,7 @@ pub(super) async fn get_grid_png(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "The grid's YAML", body = String, content_type = "application/yaml"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_grid_yaml(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_grid_yaml(at: MapAt) -> Result<Response, ApiError> {
     at.answer("application/yaml", async { Ok(yaml_of(&*at.grid().await?).into_bytes()) }).await
 }
 
@@ -189,7 +189,7 @@ pub(super) async fn get_grid_yaml(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "The graph", body = String, content_type = "text/plain"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
     let body = async { Ok(at.site.graph_as_g2o(&at.map, at.component).await?.into_bytes()) };
     at.answer("text/plain; charset=utf-8", body).await
 }
@@ -200,7 +200,7 @@ pub(super) async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "A pose a line", body = String, content_type = "text/plain"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
         let poses = at.site.map_trajectories(&at.map, at.component).await?;
         Ok(trajectory_as_tum(&poses).into_bytes())
@@ -214,7 +214,7 @@ pub(super) async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "The picture", content_type = "image/png"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_picture_png(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_picture_png(at: MapAt) -> Result<Response, ApiError> {
     at.answer("image/png", at.picture(PictureForm::Png)).await
 }
 
@@ -224,6 +224,6 @@ pub(super) async fn get_picture_png(at: MapAt) -> Result<Response, ApiError> {
     responses((status = 200, description = "The picture", body = String, content_type = "image/svg+xml"),
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub(super) async fn get_picture_svg(at: MapAt) -> Result<Response, ApiError> {
+pub async fn get_picture_svg(at: MapAt) -> Result<Response, ApiError> {
     at.answer("image/svg+xml", at.picture(PictureForm::Svg)).await
 }
