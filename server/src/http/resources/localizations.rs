@@ -8,7 +8,7 @@ use locution_engine::locate::LocalizationState;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::batches::ScanDto;
+use super::batches::{BatchDto, ScanDto};
 use super::runs::GeometryDto;
 use crate::app::examples::{ExampleInfo, ExamplePlace};
 use crate::app::localizations::LocalizationInfo;

@@ -26,7 +26,7 @@ pub async fn readyz(State(state): State<AppState>) -> Result<Response, ApiError>
 #[utoipa::path(get, path = "/ui", operation_id = "get_ui", tag = "operations",
     responses((status = 200, description = "The page", body = String, content_type = "text/html")))]
 pub async fn ui() -> Html<&'static str> {
-    Html(include_str!("../../assets/ui.html"))
+    Html(include_str!("../../../assets/ui.html"))
 }
 
 /// Counters and histograms in Prometheus' text format.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::labels::PlaceLabelDto;
+use super::maps::MapParams;
 use crate::error::ApiError;
 use crate::extract::{Paged, Params, SiteOf};
 use crate::http::values::{Page, PageParams, PointDto};
