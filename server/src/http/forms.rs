@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use axum::Json;
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, header};
@@ -53,19 +52,40 @@ impl MapAt {
         Ok(self.state.app.picture(&self.site, &self.map, self.component, form).await?)
     }
 
-    /// A form of the map with its version as ETag; 304, and nothing is made, when the client has it.
+    /// The version's ETag. A site that was deleted and made again counts its versions anew, so the build is told apart
+    /// by when and of what it was made too.
+    fn tag(&self) -> String {
+        let mut build = crc32fast::Hasher::new();
+        build.update(&self.map.duration_s.to_le_bytes());
+        for run in &self.map.runs {
+            build.update(run.name.as_bytes());
+            build.update(&run.num_scans.to_le_bytes());
+        }
+        format!("\"{}-{:08x}\"", self.map.version, build.finalize())
+    }
+
+    /// A form of the map with its ETag; 304, and nothing is made, when the client has it.
     pub(super) async fn answer(
         &self,
         content_type: &'static str,
         body: impl Future<Output = Result<Vec<u8>, ApiError>>,
     ) -> Result<Response, ApiError> {
-        let tag = format!("\"{}\"", self.map.version);
-        if self.headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes()) {
+        let tag = self.tag();
+        if is_known(&self.headers, &tag) {
             return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
         }
         let headers = [(header::ETAG, tag), (header::CONTENT_TYPE, content_type.to_owned())];
         Ok((headers, body.await?).into_response())
     }
+}
+
+/// Whether a client says that it has what a tag names; weak tags and lists of them count.
+fn is_known(headers: &HeaderMap, tag: &str) -> bool {
+    let known = headers.get_all(header::IF_NONE_MATCH).into_iter().filter_map(|value| value.to_str().ok());
+    known
+        .flat_map(|list| list.split(','))
+        .map(str::trim)
+        .any(|known| known == "*" || known.strip_prefix("W/").unwrap_or(known) == tag)
 }
 
 /// An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
@@ -138,10 +158,15 @@ fn gray_png(image: &GrayImage) -> Result<Vec<u8>, png::EncodingError> {
 /// The occupancy grid of a component, with the fields of `nav_msgs/OccupancyGrid`.
 #[utoipa::path(get, path = "/v1/sites/{site}/map/grid", operation_id = "get_grid", tag = "maps", params(MapParams),
     responses((status = 200, description = "The grid", body = GridDto),
+        (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
-pub async fn get_grid(at: MapAt) -> Result<Json<GridDto>, ApiError> {
-    let grid = at.grid().await?;
-    Ok(Json(on_blocking_thread(move || GridDto::from(&*grid)).await?))
+pub async fn get_grid(at: MapAt) -> Result<Response, ApiError> {
+    let body = async {
+        let grid = at.grid().await?;
+        let json = on_blocking_thread(move || serde_json::to_vec(&GridDto::from(&*grid))).await?;
+        Ok(json.map_err(AppError::internal)?)
+    };
+    at.answer("application/json", body).await
 }
 
 /// The same as PGM for `map_server`; its YAML is beside it.
@@ -226,4 +251,19 @@ pub async fn get_picture_png(at: MapAt) -> Result<Response, ApiError> {
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_picture_svg(at: MapAt) -> Result<Response, ApiError> {
     at.answer("image/svg+xml", at.picture(PictureForm::Svg)).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weak_and_listed_tags_are_known() {
+        let known = |value: &'static str| {
+            let headers = [(header::IF_NONE_MATCH, axum::http::HeaderValue::from_static(value))];
+            is_known(&HeaderMap::from_iter(headers), "\"2-ab\"")
+        };
+        assert!(known("\"2-ab\"") && known("\"1\", W/\"2-ab\"") && known("*"));
+        assert!(!known("\"2\"") && !known("2-ab"));
+    }
 }
