@@ -35,14 +35,15 @@ pub(super) fn apply(document: &mut Node) {
     let Some(paths) = document.get_mut("paths").and_then(Node::members) else { return };
     for (path, item) in paths {
         let Some(operations) = item.members() else { continue };
-        for operation in operations.values_mut() {
+        for (method, operation) in operations {
             name_path_parameters(path, operation);
             json_first(operation);
-            add_refusals(path, operation);
+            add_refusals(path, method, operation);
             type_answers(operation);
         }
     }
     document.for_each_object(&mut bound_integer);
+    document.for_each_object(&mut size_covariance);
     let responses =
         PROBLEMS.iter().map(|(status, name, meaning)| ((*name).to_owned(), problem(status, meaning)));
     let responses = Node::Object(responses.collect());
@@ -101,7 +102,7 @@ fn json_first(operation: &mut Node) {
 }
 
 /// The problems that any request of this kind can meet, beside those that the handler names.
-fn add_refusals(path: &str, operation: &mut Node) {
+fn add_refusals(path: &str, method: &str, operation: &mut Node) {
     let has_body = operation.get("requestBody").is_some();
     let parameters = match operation.get("parameters") {
         Some(Node::List(parameters)) => parameters.as_slice(),
@@ -123,6 +124,10 @@ fn add_refusals(path: &str, operation: &mut Node) {
     }
     if has_body {
         statuses.extend(["413", "415"]);
+    }
+    // Work waits in bounded queues.
+    if method == "post" {
+        statuses.push("429");
     }
     let Some(responses) = operation.member("responses", Node::Object(Members::new())) else { return };
     let Some(responses) = responses.members() else { return };
@@ -176,4 +181,53 @@ fn bound_integer(schema: &mut Members) {
     schema.insert("format".into(), node!(format));
     schema.entry("minimum".into()).or_insert(node!(minimum));
     schema.entry("maximum".into()).or_insert(node!(maximum));
+}
+
+/// A covariance of (x, y, θ) has three rows of three.
+fn size_covariance(members: &mut Members) {
+    let mut level = members.get_mut("covariance");
+    while let Some(Node::Object(array)) = level.take_if(|level| level.get("items").is_some()) {
+        array.insert("minItems".into(), node!(3));
+        array.insert("maxItems".into(), node!(3));
+        level = array.get_mut("items");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_operation_gets_what_holds_for_all() {
+        let mut document = node!({
+            "paths": {"/v1/sites/{site}": {"put": {
+                "requestBody": {"content": {"application/cbor": {}, "application/json": {}}},
+                "responses": {"201": {"description": "made"}, "409": {"description": "other"}},
+            }}},
+            "components": {"schemas": {"Pose": {"properties": {
+                "covariance": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
+                "count": {"type": "integer", "format": "uint8"},
+            }}}},
+        });
+        apply(&mut document);
+        let json = serde_json::to_value(&document).unwrap();
+        let put = &json["paths"]["/v1/sites/{site}"]["put"];
+        assert_eq!(put["parameters"][0]["name"], "site");
+        let statuses: Vec<&String> = put["responses"].as_object().unwrap().keys().collect();
+        let expected =
+            ["201", "400", "401", "403", "404", "408", "409", "413", "415", "422", "429", "500", "503"];
+        assert_eq!(statuses.len(), expected.len() - 1, "{statuses:?}");
+        assert!(statuses.iter().all(|status| expected.contains(&status.as_str())), "{statuses:?}");
+        assert_eq!(put["responses"]["409"]["description"], "other");
+        assert!(put["responses"]["409"]["content"]["application/problem+json"].is_object());
+        assert_eq!(put["responses"]["404"]["$ref"], "#/components/responses/NotFound");
+        let text = serde_json::to_string(&document).unwrap();
+        assert!(text.find("application/json").unwrap() < text.find("application/cbor").unwrap());
+        let members = &json["components"]["schemas"]["Pose"]["properties"];
+        assert_eq!(
+            (&members["count"]["format"], &members["count"]["maximum"]),
+            (&"int32".into(), &255.into())
+        );
+        assert_eq!(members["covariance"]["items"]["minItems"], 3);
+    }
 }

@@ -157,6 +157,7 @@ pub struct ExamplePlaceDto {
     /// The run whose stretch reads like the example.
     pub run: String,
     /// First and last observation of that stretch.
+    #[schema(min_items = 2, max_items = 2)]
     pub observations: [u32; 2],
     /// Which way it was driven.
     pub direction: DirectionDto,

@@ -82,6 +82,7 @@ pub struct WordDto {
     /// a: turn, radians.
     pub turn_rad: f32,
     /// First and last observation, both inclusive.
+    #[schema(min_items = 2, max_items = 2)]
     pub observations: [u32; 2],
     /// Words that may stand before it.
     pub predecessors: Vec<WordIdDto>,

@@ -92,8 +92,10 @@ pub struct WordAnswerDto {
     /// `same`: read forwards; `opposite`: backwards.
     pub direction: DirectionDto,
     /// First and last word of level 0; alternative words make them more than the question has.
+    #[schema(min_items = 2, max_items = 2)]
     pub words: [u32; 2],
     /// First and last observation.
+    #[schema(min_items = 2, max_items = 2)]
     pub observations: [u32; 2],
     /// Mean fit of the words, from 0 (just within the tolerances) to 1 (exact).
     #[schema(minimum = 0, maximum = 1)]
