@@ -12,7 +12,8 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use tokio::sync::OwnedSemaphorePermit;
 
-use crate::app::{AppError, Name, Site};
+use crate::app::site::Site;
+use crate::app::{AppError, Name};
 use crate::error::ApiError;
 use crate::http::values::{PageBounds, PageParams};
 use crate::http::wording::{located, plain};

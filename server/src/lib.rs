@@ -17,16 +17,19 @@ use tokio::net::TcpListener;
 use tokio::sync::watch;
 use tokio::task::JoinHandle;
 
-pub mod app;
-pub mod auth;
+mod app;
+mod auth;
 pub mod config;
-pub mod error;
-pub mod extract;
-pub mod http;
-pub mod picture;
-pub mod router;
-pub mod state;
-pub mod storage;
+mod error;
+mod extract;
+mod http;
+mod picture;
+mod records;
+mod router;
+mod state;
+mod storage;
+
+pub use http::openapi::document_json;
 
 use app::App;
 use config::{ServerConfig, ServerConfigError};

@@ -11,21 +11,22 @@ use locution_engine::occupancy::{CellState, GridMap};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::exports::{PictureForm, gray_image};
-use crate::app::maps::MapRecord;
-use crate::app::{AppError, Site, on_blocking_thread};
+use crate::app::maps::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
+use crate::app::site::Site;
+use crate::app::{AppError, on_blocking_thread};
 use crate::error::ApiError;
 use crate::extract::{Params, SiteOf};
 use crate::http::resources::maps::MapParams;
 use crate::http::resources::texts::trajectory_as_tum;
 use crate::http::values::PoseDto;
+use crate::records::Map;
 use crate::state::AppState;
 
 /// The map that a request means, and what the client already has of it.
 pub struct MapAt {
     state: AppState,
     pub(super) site: Arc<Site>,
-    pub(super) map: MapRecord,
+    pub(super) map: Map,
     pub(super) component: Option<u32>,
     headers: HeaderMap,
 }
@@ -56,12 +57,12 @@ impl MapAt {
     /// by when and of what it was made too.
     fn tag(&self) -> String {
         let mut build = crc32fast::Hasher::new();
-        build.update(&self.map.duration_s.to_le_bytes());
-        for run in &self.map.runs {
+        build.update(&self.map.record.duration_s.to_le_bytes());
+        for run in &self.map.record.runs {
             build.update(run.name.as_bytes());
             build.update(&run.num_scans.to_le_bytes());
         }
-        format!("\"{}-{:08x}\"", self.map.version, build.finalize())
+        format!("\"{}-{:08x}\"", self.map.record.version, build.finalize())
     }
 
     /// A form of the map with its ETag; 304, and nothing is made, when the client has it.
@@ -215,7 +216,7 @@ pub async fn get_grid_yaml(at: MapAt) -> Result<Response, ApiError> {
         (status = 304, description = "The client has this version"),
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
-    let body = async { Ok(at.site.graph_as_g2o(&at.map, at.component).await?.into_bytes()) };
+    let body = async { Ok(graph_as_g2o(&at.map, at.component).await?.into_bytes()) };
     at.answer("text/plain; charset=utf-8", body).await
 }
 
@@ -227,7 +228,7 @@ pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
-        let poses = at.site.map_trajectories(&at.map, at.component).await?;
+        let poses = map_trajectories(&at.site, &at.map, at.component).await?;
         Ok(trajectory_as_tum(&poses).into_bytes())
     };
     at.answer("text/plain; charset=utf-8", body).await

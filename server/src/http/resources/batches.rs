@@ -6,14 +6,13 @@ use locution_engine::scan::Scan;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::NewBatch;
-use crate::app::reading::read_run_scans;
-use crate::app::records::Receipt;
+use crate::app::runs::NewBatch;
 use crate::error::ApiError;
 use crate::extract::{BatchSlot, Body, NoParams, Paged, RunName, SiteOf};
 use crate::http::nanoseconds;
 use crate::http::ranges::RangesDto;
 use crate::http::values::{Page, PageParams, PoseDto};
+use crate::records::Receipt;
 use crate::state::AppState;
 
 /// One sweep with the odometry at its time.
@@ -145,9 +144,9 @@ pub async fn list_scans(
     RunName(name): RunName,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<StoredScanDto>>, ApiError> {
-    let info = site.run(&name).await?;
-    let scans = read_run_scans(&**site.store(), &info, page.first, page.limit).await?;
+    let run = site.run(&name).await?;
+    let scans = run.scans(page.first..page.first.saturating_add(page.limit as u64)).await?;
     let items =
         (page.first..).zip(scans).map(|(scan_seq, scan)| StoredScanDto::new(scan_seq, scan)).collect();
-    Ok(Json(Page::of(items, page.first, info.head.next_sequence)))
+    Ok(Json(Page::of(items, page.first, run.head.next_sequence)))
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::AppError;
-use crate::app::changes::{NoSessions, Sessions};
+use crate::app::maps::{NoSessions, Sessions};
 use crate::error::ApiError;
 use crate::extract::{Paged, SiteOf};
 use crate::http::values::{Page, PageParams, PointDto};
@@ -97,7 +97,7 @@ pub async fn list_changes(
 ) -> Result<Json<Page<ChangeDto>>, ApiError> {
     let map = site.map(params.version).await?;
     let (before, after) = (names(params.before.as_ref()), names(params.after.as_ref()));
-    let sessions = Sessions::new(&map, before.as_deref(), after.as_deref()).map_err(refusal)?;
+    let sessions = Sessions::new(&map.record, before.as_deref(), after.as_deref()).map_err(refusal)?;
     let changes = state.app.changes(&site, &map, &sessions).await?;
     let items = changes.iter().map(|change| ChangeDto::new(sessions.component, change));
     Ok(Json(Page::of_all(items, changes.len(), page)))

@@ -7,11 +7,12 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::{JobInfo, JobKind, JobState};
+use crate::app::site::JobInfo;
 use crate::error::ApiError;
 use crate::extract::{IdOf, NoParams, Paged, Params, SiteOf};
 use crate::http::values::{Page, PageParams};
 use crate::http::with_location;
+use crate::records::{JobKind, JobState};
 use crate::state::AppState;
 
 /// How far a job is.
@@ -103,7 +104,7 @@ pub async fn build_map(
         let location = format!("/v1/sites/{}/jobs/{}", site.name(), job.record.id);
         return Ok(with_location(&location, (StatusCode::ACCEPTED, Json(JobDto::from(job)))));
     }
-    Ok(Json(JobDto::from(site.job_ended(job.record.id).await?)).into_response())
+    Ok(Json(JobDto::from(site.jobs().ended(job.record.id).await?)).into_response())
 }
 
 /// All jobs that are remembered, the newest first.
@@ -114,7 +115,7 @@ pub async fn list_jobs(
     SiteOf(site): SiteOf,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<JobDto>>, ApiError> {
-    let jobs = site.jobs();
+    let jobs = site.jobs().all();
     let total = jobs.len();
     Ok(Json(Page::of_all(jobs.into_iter().map(JobDto::from), total, page)))
 }
@@ -123,5 +124,5 @@ pub async fn list_jobs(
 #[utoipa::path(get, path = "/v1/sites/{site}/jobs/{id}", operation_id = "get_job", tag = "jobs",
     responses((status = 200, description = "The job", body = JobDto)))]
 pub async fn get_job(SiteOf(site): SiteOf, IdOf(id): IdOf) -> Result<Json<JobDto>, ApiError> {
-    Ok(Json(site.job(id)?.into()))
+    Ok(Json(site.jobs().get(id)?.into()))
 }

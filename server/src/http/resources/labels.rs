@@ -1,11 +1,11 @@
 //! Labelled places, and questions in their words.
 
 use axum::Json;
-use locution_engine::semantics::PlaceLabel;
+use locution_engine::semantics::{LabelPattern, PlaceLabel};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::labels::{LabelAnswer, LabelPattern, LabeledStretch};
+use crate::app::maps::{DrivenStretch, LabelAnswer, find_labels, labels};
 use crate::error::ApiError;
 use crate::extract::{Body, Paged, SiteOf};
 use crate::http::values::{Page, PageParams, PoseDto};
@@ -78,11 +78,12 @@ pub struct LabelDto {
     pub map_from_middle: PoseDto,
 }
 
-impl From<LabeledStretch> for LabelDto {
-    fn from(stretch: LabeledStretch) -> Self {
+impl From<DrivenStretch> for LabelDto {
+    fn from(driven: DrivenStretch) -> Self {
+        let stretch = driven.stretch;
         Self {
-            run: stretch.run,
-            component: stretch.component,
+            run: driven.run,
+            component: driven.component,
             label: stretch.label.into(),
             first: stretch.first,
             last: stretch.last,
@@ -194,7 +195,7 @@ pub async fn list_labels(
     SiteOf(site): SiteOf,
     Paged(params, page): Paged<LabelParams>,
 ) -> Result<Json<Page<LabelDto>>, ApiError> {
-    let labels = site.labels(&site.map(params.version).await?).await?;
+    let labels = labels(&site.map(params.version).await?).await?;
     let total = labels.len();
     Ok(Json(Page::of_all(labels.into_iter().map(LabelDto::from), total, page)))
 }
@@ -210,6 +211,6 @@ pub async fn query_labels(
 ) -> Result<Json<Vec<LabelAnswerDto>>, ApiError> {
     let (patterns, limit) = query.check()?;
     let map = site.map(None).await?;
-    let answers = site.find_labels(&map, &patterns, limit).await?;
+    let answers = find_labels(&map, &patterns, limit).await?;
     Ok(Json(answers.into_iter().map(LabelAnswerDto::from).collect()))
 }

@@ -10,9 +10,9 @@ use utoipa::ToSchema;
 
 use super::batches::{BatchDto, ScanDto};
 use super::runs::GeometryDto;
-use crate::app::examples::{ExampleInfo, ExamplePlace};
-use crate::app::localizations::LocalizationInfo;
-use crate::app::{AppError, NewBatch};
+use crate::app::AppError;
+use crate::app::ask::{ExampleInfo, ExamplePlace, LocalizationInfo};
+use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
@@ -97,7 +97,7 @@ impl From<LocalizationInfo> for LocalizationDto {
 }
 
 fn hypotheses_of(info: &LocalizationInfo) -> Vec<HypothesisDto> {
-    let hypothesis = |found: &crate::app::localizations::LocatedHypothesis| HypothesisDto {
+    let hypothesis = |found: &crate::app::ask::LocatedHypothesis| HypothesisDto {
         component: found.component,
         map_from_robot: found.map_from_robot.into(),
         covariance: found.covariance,

@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::AppError;
-use crate::app::maps::{MapRecord, MapRun, PlacedRun};
-use crate::app::regions::Topology;
+use crate::app::maps::{Topology, topology};
 use crate::error::ApiError;
 use crate::http::forms::MapAt;
 use crate::http::values::PoseDto;
+use crate::records::{MapPose, MapRecord, MapRun, PlacedRun};
 
 /// Which map.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
@@ -196,7 +196,7 @@ pub fn map_dto(map: &MapRecord, versions: Vec<u64>, runs: &[PlacedRun], topology
 }
 
 fn run_dto(placed: &PlacedRun) -> MapRunDto {
-    let pose = |pose: &crate::app::maps::MapPose| {
+    let pose = |pose: &MapPose| {
         let at = pose.map_from_robot;
         KeyframePoseDto { scan_seq: pose.scan_seq, x: at.x, y: at.y, theta: at.theta }
     };
@@ -216,10 +216,11 @@ fn run_dto(placed: &PlacedRun) -> MapRunDto {
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_map(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
-        let runs = at.site.placed_runs(&at.map, at.component).await?;
-        let topology = at.site.topology(&at.map, &runs).await?;
+        let runs = at.map.placed_runs(at.component).await?;
+        let topology = topology(&at.map, &runs).await?;
         let versions = at.site.map_versions().await?;
-        Ok(serde_json::to_vec(&map_dto(&at.map, versions, &runs, topology)).map_err(AppError::internal)?)
+        Ok(serde_json::to_vec(&map_dto(&at.map.record, versions, &runs, topology))
+            .map_err(AppError::internal)?)
     };
     at.answer("application/json", body).await
 }

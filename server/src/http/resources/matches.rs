@@ -2,17 +2,19 @@
 
 use axum::Json;
 use axum::http::StatusCode;
-use locution_engine::mapping::{Channel, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
+use locution_engine::mapping::{
+    Channel, Direction, Evidence, MatchState, PlaceMatch, Registration, RejectionReason,
+};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::maps::VersionParams;
 use crate::app::Name;
-use crate::app::maps::MapRecord;
-use crate::app::matches::{MatchFilter, NumberedMatch};
+use crate::app::maps::{MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide};
 use crate::error::ApiError;
 use crate::extract::{Body, IdOf, Paged, Params, SiteOf};
 use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto, one_of};
+use crate::records::MapRecord;
 
 /// Which matches to list.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
@@ -41,11 +43,21 @@ impl MatchParams {
     /// # Errors
     /// 422 for a word that is none of the choices.
     pub fn filter(&self, run: Option<u32>) -> Result<MatchFilter, ApiError> {
-        one_of::<MatchStateDto>("state", self.state.as_deref())?;
-        one_of::<ChannelDto>("channel", self.channel.as_deref())?;
-        one_of::<DirectionDto>("direction", self.direction.as_deref())?;
-        let (state, channel) = (self.state.clone(), self.channel.clone());
-        Ok(MatchFilter { state, channel, direction: self.direction.clone(), run })
+        let state = one_of("state", self.state.as_deref())?.map(|state| match state {
+            MatchStateDto::Candidate => MatchStateKind::Candidate,
+            MatchStateDto::Verified => MatchStateKind::Verified,
+            MatchStateDto::Rejected => MatchStateKind::Rejected,
+        });
+        let channel = one_of("channel", self.channel.as_deref())?.map(|channel| match channel {
+            ChannelDto::Words => Channel::Words,
+            ChannelDto::Profile => Channel::Profile,
+            ChannelDto::Spatial => Channel::Spatial,
+        });
+        let direction = one_of("direction", self.direction.as_deref())?.map(|direction| match direction {
+            DirectionDto::Same => Direction::Same,
+            DirectionDto::Opposite => Direction::Opposite,
+        });
+        Ok(MatchFilter { state, channel, direction, run })
     }
 }
 
@@ -259,8 +271,8 @@ pub async fn list_matches(
         Some(run) => Some(site.run(&Name::new(run, "run")?).await?.idx),
         None => None,
     };
-    let (matches, next) = site.matches(&map, &params.filter(run)?, page.first, page.limit).await?;
-    let items = matches.into_iter().map(|found| MatchDto::new(found, &map)).collect();
+    let (matches, next) = matches(&map, &params.filter(run)?, page.first, page.limit).await?;
+    let items = matches.into_iter().map(|found| MatchDto::new(found, &map.record)).collect();
     Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }
 
@@ -275,7 +287,7 @@ pub async fn get_match(
     Params(params): Params<VersionParams>,
 ) -> Result<Json<MatchDto>, ApiError> {
     let map = site.map(params.version).await?;
-    Ok(Json(MatchDto::new(site.a_match(&map, id).await?, &map)))
+    Ok(Json(MatchDto::new(a_match(&map, id).await?, &map.record)))
 }
 
 /// Veto or confirm a match. It sticks to the pair of places, also in maps to come, and counts at the next build.
@@ -290,9 +302,9 @@ pub async fn decide_match(
     Body(decision): Body<DecisionDto>,
 ) -> Result<Json<MatchDto>, ApiError> {
     let map = site.map(params.version).await?;
-    let found = site.a_match(&map, id).await?.found;
-    site.decide(&found, decision.decision == DecisionKindDto::Confirm).await?;
-    Ok(Json(MatchDto::new(site.a_match(&map, id).await?, &map)))
+    let found = a_match(&map, id).await?.found;
+    decide(&site, &found, decision.decision == DecisionKindDto::Confirm).await?;
+    Ok(Json(MatchDto::new(a_match(&map, id).await?, &map.record)))
 }
 
 /// Take back what was said of a match.
@@ -306,7 +318,7 @@ pub async fn undecide_match(
     Params(params): Params<VersionParams>,
 ) -> Result<StatusCode, ApiError> {
     let map = site.map(params.version).await?;
-    let found = site.a_match(&map, id).await?.found;
-    site.undecide(&found).await?;
+    let found = a_match(&map, id).await?.found;
+    undecide(&site, &found).await?;
     Ok(StatusCode::NO_CONTENT)
 }

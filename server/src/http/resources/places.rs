@@ -8,6 +8,7 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::labels::PlaceLabelDto;
 use super::maps::MapParams;
+use crate::app::maps::{find_route, places};
 use crate::error::ApiError;
 use crate::extract::{Paged, Params, SiteOf};
 use crate::http::values::{Page, PageParams, PointDto};
@@ -139,7 +140,7 @@ pub async fn list_places(
     Paged(params, page): Paged<MapParams>,
 ) -> Result<Json<Page<PlaceDto>>, ApiError> {
     let map = site.map(params.version).await?;
-    let places = site.places(&map, params.component.unwrap_or(0)).await?;
+    let places = places(&map, params.component.unwrap_or(0)).await?;
     let items = (0..).zip(&places.places).map(|(number, place)| PlaceDto::new(number, place));
     Ok(Json(Page::of_all(items, places.places.len(), page)))
 }
@@ -155,5 +156,5 @@ pub async fn get_route(
 ) -> Result<Json<RouteDto>, ApiError> {
     let map = site.map(params.version).await?;
     let (from, to) = (Point2::new(params.from_x, params.from_y), Point2::new(params.to_x, params.to_y));
-    Ok(Json(site.route(&map, params.component, from, to).await?.into()))
+    Ok(Json(find_route(&map, params.component, from, to).await?.into()))
 }

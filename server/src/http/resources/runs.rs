@@ -8,11 +8,12 @@ use locution_engine::scan::ScanGeometry;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::{NewRun, RunInfo};
+use crate::app::runs::NewRun;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, RunName, SiteOf};
 use crate::http::values::{Page, PageParams, PoseDto};
 use crate::http::with_location;
+use crate::records::Run;
 use crate::state::AppState;
 
 /// What all scans of a run share.
@@ -127,17 +128,17 @@ pub struct RunDto {
     pub num_words: u64,
 }
 
-impl From<RunInfo> for RunDto {
-    fn from(info: RunInfo) -> Self {
+impl From<Run> for RunDto {
+    fn from(run: Run) -> Self {
         Self {
-            run: info.run.name.clone(),
-            robot: info.run.robot.clone(),
-            geometry: GeometryDto::from(&info.run.geometry),
-            state: if info.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
-            next_sequence: info.head.next_sequence,
-            num_scans: info.head.next_sequence,
-            num_observations: info.text.num_observations,
-            num_words: info.text.num_words_all_levels(),
+            run: run.record.name.clone(),
+            robot: run.record.robot.clone(),
+            geometry: GeometryDto::from(&run.record.geometry),
+            state: if run.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
+            next_sequence: run.head.next_sequence,
+            num_scans: run.head.next_sequence,
+            num_observations: run.text.num_observations,
+            num_words: run.text.num_words_all_levels(),
         }
     }
 }

@@ -8,7 +8,7 @@ use locution_engine::config::EngineConfig;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::SiteInfo;
+use crate::app::site::SiteInfo;
 use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, SiteName, SiteOf};

@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 use axum::Json;
 use axum::response::{IntoResponse, Response};
+use locution_engine::formats::write_tum;
 use locution_engine::text::{Observation, Word, WordId};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::reading::{read_observations, read_words};
-use crate::app::{Frame, StampedPose, Trajectory};
+use crate::app::runs::{Frame, StampedPose, Trajectory, trajectory};
 use crate::error::ApiError;
 use crate::extract::{NoParams, Paged, Params, RunName, SiteOf, WantsText};
 use crate::http::text;
@@ -195,18 +195,9 @@ impl From<Trajectory> for TrajectoryDto {
     }
 }
 
-/// TUM's format: `timestamp tx ty tz qx qy qz qw`, seconds with nine decimals from the integer nanoseconds.
+/// TUM's format.
 pub fn trajectory_as_tum(poses: &[StampedPose]) -> String {
-    let mut text = String::with_capacity(poses.len() * 80);
-    for pose in poses {
-        let nanoseconds = i128::from(pose.timestamp_ns);
-        let sign = if nanoseconds < 0 { "-" } else { "" };
-        let (seconds, rest) = (nanoseconds.abs() / 1_000_000_000, nanoseconds.abs() % 1_000_000_000);
-        let at = pose.frame_from_robot;
-        let (sin, cos) = (at.theta / 2.0).sin_cos();
-        let _ = writeln!(text, "{sign}{seconds}.{rest:09} {:.6} {:.6} 0 0 0 {sin:.9} {cos:.9}", at.x, at.y);
-    }
-    text
+    write_tum(poses.iter().map(|pose| (pose.timestamp_ns, pose.frame_from_robot)))
 }
 
 /// Density samples, in order of travel.
@@ -218,10 +209,10 @@ pub async fn list_observations(
     RunName(name): RunName,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<ObservationDto>>, ApiError> {
-    let (generation, info) = (site.generation(), site.run(&name).await?);
-    let items = read_observations(&**site.store(), generation, &info, page.first, page.limit).await?;
+    let run = site.run(&name).await?;
+    let items = run.observations(page.first, page.limit).await?;
     let items = (page.first..).zip(items).map(|(number, item)| ObservationDto::new(number, item)).collect();
-    Ok(Json(Page::of(items, page.first, info.text.num_observations)))
+    Ok(Json(Page::of(items, page.first, run.text.num_observations)))
 }
 
 /// The text of a run, one level at a time; `Accept: text/plain` gives all words of the level, one a line.
@@ -236,14 +227,13 @@ pub async fn list_words(
     Paged(params, page): Paged<WordParams>,
 ) -> Result<Response, ApiError> {
     let (first, limit) = if wants_text { (0, usize::MAX) } else { (page.first, page.limit) };
-    let (generation, info) = (site.generation(), site.run(&name).await?);
-    let words = read_words(&**site.store(), generation, &info, params.level, first, limit).await?;
+    let run = site.run(&name).await?;
+    let words = run.words(params.level, first, limit).await?;
     if wants_text {
         return Ok(text(words_as_text(&words)));
     }
-    let num_words = info.text.num_words.get(usize::from(params.level)).copied().unwrap_or(0);
     let items = words.into_iter().map(WordDto::from).collect();
-    Ok(Json(Page::of(items, first, num_words)).into_response())
+    Ok(Json(Page::of(items, first, run.num_words(params.level))).into_response())
 }
 
 /// A pose for every scan, in the frame asked for; `Accept: text/plain` gives TUM's format.
@@ -258,8 +248,8 @@ pub async fn get_trajectory(
     WantsText(wants_text): WantsText,
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
-    let info = site.run(&name).await?;
-    let trajectory = site.trajectory(&info, params.frame.into(), params.version).await?;
+    let run = site.run(&name).await?;
+    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
     if wants_text {
         return Ok(text(trajectory_as_tum(&trajectory.poses)));
     }
@@ -276,7 +266,7 @@ pub async fn get_trajectory_tum(
     RunName(name): RunName,
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
-    let info = site.run(&name).await?;
-    let trajectory = site.trajectory(&info, params.frame.into(), params.version).await?;
+    let run = site.run(&name).await?;
+    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
     Ok(text(trajectory_as_tum(&trajectory.poses)))
 }
