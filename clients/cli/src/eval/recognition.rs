@@ -176,7 +176,7 @@ fn ngram_matches(words: &[Word]) -> Result<BTreeMap<usize, usize>> {
             class: word.class,
             size: word.size,
             turn_rad: word.turn_rad,
-            observations: word.observations,
+            observations: word.observations.into(),
             predecessors: word
                 .predecessors
                 .iter()

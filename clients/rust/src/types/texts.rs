@@ -54,7 +54,7 @@ pub struct Word {
 }
 
 /// In whose coordinates poses are given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Frame {
     /// The map that serves.
