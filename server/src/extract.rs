@@ -16,7 +16,7 @@ use crate::app::site::Site;
 use crate::app::{AppError, Name};
 use crate::error::ApiError;
 use crate::http::values::{PageBounds, PageParams};
-use crate::http::wording::{located, plain};
+use crate::http::wording::{located, of_cbor, plain};
 use crate::state::AppState;
 
 /// Bodies above this are parsed on a blocking thread.
@@ -88,7 +88,7 @@ fn parse_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
     match ciborium::from_reader::<Located<T>, _>(bytes) {
         Ok(Located(value)) => Ok(value),
         Err(ciborium::de::Error::Semantic(_, message)) => match message.split_once(LOCATION_END) {
-            Some((path, problem)) => Err(malformed(path.to_owned(), &problem)),
+            Some((path, problem)) => Err(malformed(path.to_owned(), &of_cbor(problem))),
             None => Err(ApiError::malformed(plain(&message))),
         },
         Err(ciborium::de::Error::Io(_)) => Err(ApiError::malformed("the body ends before its CBOR does")),

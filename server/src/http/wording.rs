@@ -53,6 +53,21 @@ pub(crate) fn plain(message: &str) -> String {
     plain.join(" ").replace(" ,", ",").replace(" ;", ";").replace(" .", ".")
 }
 
+/// What a CBOR reader says, taken out of the wrapping that it prints.
+pub(crate) fn of_cbor(message: &str) -> String {
+    if message.starts_with("Io(") {
+        return "the body ends before its CBOR does".to_owned();
+    }
+    if message.starts_with("Syntax(") {
+        return "the body is not CBOR".to_owned();
+    }
+    let inside = message.strip_prefix("Semantic(").and_then(|rest| rest.split_once(", \""));
+    match inside.and_then(|(_, said)| said.strip_suffix("\")")) {
+        Some(said) => said.replace("\\\"", "\""),
+        None => message.to_owned(),
+    }
+}
+
 /// Parts a message such as `scans[3].theta: not a number` into the path and the problem.
 pub(crate) fn located(message: &str) -> (Option<&str>, &str) {
     match message.split_once(": ") {
@@ -95,6 +110,15 @@ mod tests {
         ] {
             assert_eq!(plain(theirs), ours);
         }
+    }
+
+    #[test]
+    fn cbor_is_unwrapped() {
+        let wrapped = r#"Semantic(None, "invalid type: string \"x\", expected u8")"#;
+        assert_eq!(of_cbor(wrapped), "invalid type: string \"x\", expected u8");
+        assert_eq!(of_cbor("Semantic(Some(7), \"too long\")"), "too long");
+        assert_eq!(of_cbor("Io(Error { kind: UnexpectedEof })"), "the body ends before its CBOR does");
+        assert_eq!(of_cbor("missing field `scans`"), "missing field `scans`");
     }
 
     #[test]
