@@ -15,7 +15,6 @@ pub enum AppError {
     NotFound {
         /// What was looked for.
         kind: &'static str,
-        /// Its name.
         name: String,
     },
     /// A thing of this name exists and is different.
@@ -35,7 +34,6 @@ pub enum AppError {
     /// The run takes no more scans.
     #[error("the run `{run}` is finished")]
     Finished {
-        /// Its name.
         run: String,
         /// Number of its scans.
         expected_sequence: u64,
@@ -59,12 +57,10 @@ pub enum AppError {
     /// A bounded queue is full.
     #[error("{queue} is full")]
     Busy {
-        /// Which queue.
         queue: &'static str,
         /// When to ask again.
         retry_after: Duration,
     },
-    /// The storage failed.
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// A bug of ours.

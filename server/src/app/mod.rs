@@ -31,8 +31,6 @@ mod jobs;
 pub mod maps;
 mod names;
 pub mod runs;
-#[cfg(test)]
-mod script_tests;
 pub mod site;
 mod sites;
 
@@ -122,9 +120,6 @@ impl App {
     }
 
     /// Finishes what is under way and closes the storage.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn close(&self) -> Result<(), AppError> {
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).clear();
         Ok(self.storage.close().await?)

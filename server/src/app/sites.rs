@@ -92,9 +92,6 @@ impl App {
     }
 
     /// All sites that `is_wanted`, by name.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn sites(
         self: &Arc<Self>,
         is_wanted: impl Fn(&str) -> bool,

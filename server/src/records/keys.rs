@@ -56,7 +56,6 @@ pub enum Key {
     Match(MapVersion, u64),
     /// A person's word on a pair of places.
     Decision(u64),
-    /// A background job.
     Job(u64),
 }
 

@@ -20,7 +20,6 @@ use crate::storage::{Batch, StorageError};
 /// A map version, with the texts of the generation that serves.
 #[derive(Clone)]
 pub struct Map {
-    /// What it is.
     pub record: MapRecord,
     reader: SiteReader,
 }
@@ -83,9 +82,6 @@ impl Map {
     }
 
     /// All runs that are in a component, or in any.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn placed_runs(&self, component: Option<u32>) -> Result<Vec<PlacedRun>, StorageError> {
         let mut placed = Vec::new();
         for map_run in &self.record.runs {
@@ -99,9 +95,6 @@ impl Map {
     }
 
     /// The places of a component; `None` for a component without any.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn places(&self, component: u32) -> Result<Option<PlaceMap>, StorageError> {
         let prefix = Key::all_places(self.record.version, component);
         let stored = self.reader.store().scan(&prefix, &[], usize::MAX).await?;
@@ -113,9 +106,6 @@ impl Map {
     }
 
     /// Calls `visit(number, match)` for every match from a number on, until it answers that it has enough.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn visit_matches(
         &self,
         from: u64,
@@ -139,9 +129,6 @@ impl Map {
     }
 
     /// One match by its number; `None` when there is none.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn a_match(&self, id: u64) -> Result<Option<PlaceMatch>, StorageError> {
         if id >= self.record.num_matches {
             return Ok(None);
@@ -157,9 +144,7 @@ impl Map {
 /// Whether more is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
-    /// Yes.
     GoOn,
-    /// No.
     Enough,
 }
 

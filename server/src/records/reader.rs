@@ -34,9 +34,6 @@ impl SiteReader {
     }
 
     /// The number of a run of a name; `None` when there is none.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn run_idx(&self, name: &str) -> Result<Option<RunIdx>, StorageError> {
         get(self.store(), &Key::RunName(name.to_owned()), "the number of a run").await
     }
@@ -56,27 +53,18 @@ impl SiteReader {
     }
 
     /// A map version; `None` when it is not kept.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn map(&self, version: MapVersion) -> Result<Option<Map>, StorageError> {
         let record = get(self.store(), &Key::Map(version), "a map version").await?;
         Ok(record.map(|record| Map::new(record, self.clone())))
     }
 
     /// Numbers of all map versions that are there, oldest first; one that is being written may be among them.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn map_versions(&self) -> Result<Vec<MapVersion>, StorageError> {
         let entries = self.store.scan(&Key::all_maps(), &[], usize::MAX).await?;
         Ok(entries.iter().filter_map(|(key, _)| Key::last_u64(key)).collect())
     }
 
     /// All decisions with their numbers, in the order they were made.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn decisions(&self) -> Result<Vec<(u64, Decision)>, StorageError> {
         let entries = self.store.scan(&Key::all_decisions(), &[], usize::MAX).await?;
         let decisions = entries.iter().map(|(key, bytes)| {

@@ -23,7 +23,6 @@ const NUM_SCANS_PER_READ: u64 = 2_048;
 pub struct Run {
     /// Position among the site's runs.
     pub idx: RunIdx,
-    /// What it is.
     pub record: Arc<RunRecord>,
     /// How far the recording has come.
     pub head: RunHead,
@@ -54,10 +53,6 @@ impl Run {
         series::read(self.reader.store(), &prefix, key, from..self.text.num_observations, limit).await
     }
 
-    /// All observations.
-    ///
-    /// # Errors
-    /// As [`Run::observations`].
     pub async fn all_observations(&self) -> Result<Vec<Observation>, StorageError> {
         self.observations(0, usize::MAX).await
     }
@@ -74,9 +69,6 @@ impl Run {
     }
 
     /// The words of all levels, level by level, from a number of each on.
-    ///
-    /// # Errors
-    /// As [`Run::words`].
     pub async fn words_after(&self, num_known: &[u64]) -> Result<Vec<Word>, StorageError> {
         let mut words = Vec::new();
         for level in 0..self.text.num_words.len() {

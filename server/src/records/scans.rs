@@ -53,9 +53,6 @@ pub async fn read_scans(
 }
 
 /// The timestamps and odometry of a range of sequence numbers, without unpacking the readings.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn read_stamps(
     reader: &dyn Reader,
     run: RunIdx,
@@ -72,9 +69,6 @@ pub async fn read_stamps(
 }
 
 /// What the batch that began and ended with these numbers was answered, when there was such a batch.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn find_receipt(
     reader: &dyn Reader,
     run: RunIdx,

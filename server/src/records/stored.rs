@@ -32,7 +32,6 @@ pub struct RunRecord {
     pub name: String,
     /// The robot, when the client said.
     pub robot: Option<String>,
-    /// The laser.
     pub geometry: ScanGeometry,
 }
 
@@ -54,11 +53,9 @@ pub struct TextHead {
     pub num_scans: u64,
     /// Whether the pending tail was flushed because the run is finished.
     pub is_finished: bool,
-    /// Observations stored.
     pub num_observations: u64,
     /// Words stored, by level.
     pub num_words: Vec<u64>,
-    /// Keyframes stored.
     pub num_keyframes: u64,
     /// Scans that the stored translator had seen; 0: none is stored.
     pub checkpoint_scans: u64,
@@ -122,7 +119,6 @@ pub enum JobState {
     Running,
     /// It did what it should.
     Done,
-    /// It did not.
     Failed,
 }
 
@@ -131,7 +127,6 @@ pub enum JobState {
 pub struct JobRecord {
     /// Its number in the site.
     pub id: u64,
-    /// What it does.
     pub kind: JobKind,
     /// How far it is.
     pub state: JobState,
@@ -139,6 +134,5 @@ pub struct JobRecord {
     pub num_attempts: u32,
     /// What it is at, or what came of it.
     pub detail: String,
-    /// Why it failed.
     pub error: Option<String>,
 }

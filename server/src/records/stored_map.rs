@@ -9,7 +9,6 @@ use super::keys::{MapVersion, RunIdx};
 /// `Key::Map`: what a version is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapRecord {
-    /// Its number.
     pub version: MapVersion,
     /// Parts of the map that nothing connects.
     pub num_components: u32,
@@ -35,7 +34,6 @@ impl MapRecord {
 pub struct MapRun {
     /// Its number in the site.
     pub run: RunIdx,
-    /// Its name.
     pub name: String,
     /// The frame of its poses; runs of one component share it.
     pub component: u32,

@@ -28,9 +28,6 @@ pub struct WordAnswer {
 }
 
 /// Where a sequence of words is driven, the best fit first.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn find_words(
     site: &Site,
     patterns: &[WordPattern],

@@ -8,9 +8,6 @@ use crate::records::{JobKind, JobRecord, JobState, Key, codec};
 
 impl App {
     /// Queues a job and sees that it is worked on. One of the same kind that still waits will do.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn queue_job(self: &Arc<Self>, site: &Arc<Site>, kind: JobKind) -> Result<JobInfo, AppError> {
         if let Some(waiting) = site.jobs().waiting(kind) {
             return Ok(waiting);

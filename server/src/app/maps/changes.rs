@@ -123,9 +123,6 @@ fn placed(runs: &[LoadedRun]) -> Vec<PlacedRun<'_>> {
 
 impl App {
     /// What changed from one session to the other, largest first.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn changes(
         &self,
         site: &Site,

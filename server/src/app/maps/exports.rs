@@ -59,9 +59,6 @@ async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> R
 }
 
 /// Poses of every scan of every run of a component, or of all, in the order of the runs.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn map_trajectories(
     site: &Site,
     map: &Map,
@@ -103,17 +100,12 @@ pub fn gray_image(grid: &GridMap) -> GrayImage {
 /// Which form a picture has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PictureForm {
-    /// Pixels.
     Png,
-    /// Vectors.
     Svg,
 }
 
 impl App {
     /// A picture of a version: walls, a colour per run, verified matches.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn picture(
         &self,
         site: &Site,

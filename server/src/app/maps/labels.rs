@@ -14,7 +14,6 @@ pub struct DrivenStretch {
     pub run: String,
     /// Component of the map.
     pub component: u32,
-    /// The stretch.
     pub stretch: LabeledStretch,
 }
 
@@ -30,9 +29,6 @@ pub struct LabelAnswer {
 }
 
 /// All labelled stretches of a version, in the order of runs and travel.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn labels(map: &Map) -> Result<Vec<DrivenStretch>, AppError> {
     let mut labels = Vec::new();
     for run in labeled_runs(map) {
@@ -42,9 +38,6 @@ pub async fn labels(map: &Map) -> Result<Vec<DrivenStretch>, AppError> {
 }
 
 /// Where a sequence of labels was driven, in either direction, the surest first.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn find_labels(
     map: &Map,
     patterns: &[LabelPattern],

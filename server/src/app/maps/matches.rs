@@ -14,7 +14,6 @@ use crate::records::{Key, Map, RunIdx, Visit, codec};
 pub struct NumberedMatch {
     /// Its number in the map version.
     pub id: u64,
-    /// The match.
     pub found: PlaceMatch,
     /// What a person said of this pair of places: true, it is the same; false, it is not.
     pub decision: Option<bool>,
@@ -60,8 +59,7 @@ impl MatchFilter {
         Self { state: Some(MatchStateKind::Verified), ..Self::default() }
     }
 
-    /// Whether a match is one of them.
-    pub fn accepts(&self, found: &PlaceMatch) -> bool {
+    fn accepts(&self, found: &PlaceMatch) -> bool {
         self.state.is_none_or(|state| state == MatchStateKind::from(&found.state))
             && self.channel.is_none_or(|channel| channel == found.channel)
             && self.direction.is_none_or(|direction| direction == found.direction)
@@ -70,9 +68,6 @@ impl MatchFilter {
 }
 
 /// Up to `limit` matches that pass a filter, from number `from` on, and the number to go on with.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn matches(
     map: &Map,
     filter: &MatchFilter,
@@ -109,9 +104,6 @@ pub async fn a_match(map: &Map, id: u64) -> Result<NumberedMatch, AppError> {
 }
 
 /// Says of a pair of places whether it is the same; what was said of it before no longer holds.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn decide(site: &Site, found: &PlaceMatch, is_same_place: bool) -> Result<(), AppError> {
     let stale = decisions_on(site, found).await?;
     let decision =
@@ -126,9 +118,6 @@ pub async fn decide(site: &Site, found: &PlaceMatch, is_same_place: bool) -> Res
 }
 
 /// Takes back what was said of a pair of places.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn undecide(site: &Site, found: &PlaceMatch) -> Result<(), AppError> {
     let stale = decisions_on(site, found).await?;
     site.change(|_, batch| {

@@ -19,7 +19,6 @@ pub struct Region {
     pub component: u32,
     /// Number of the word of level 0.
     pub word: u32,
-    /// Density class.
     pub class: u8,
     /// First and last observation.
     pub observations: (u32, u32),
@@ -27,7 +26,6 @@ pub struct Region {
     pub length_m: f64,
     /// Radians turned in it.
     pub turn_rad: f64,
-    /// Its middle.
     pub map_from_middle: Pose2,
 }
 
@@ -43,9 +41,6 @@ pub struct Topology {
 }
 
 /// The topological view of a version, as far as some of its runs make it.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn topology(map: &Map, runs: &[PlacedRun]) -> Result<Topology, AppError> {
     let mut topology = Topology::default();
     for placed in runs {

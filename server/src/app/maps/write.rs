@@ -18,18 +18,13 @@ const COMMIT_BYTES_MAX: usize = 4 << 20;
 pub struct WrittenRun {
     /// Its number in the site.
     pub run: RunIdx,
-    /// Its name.
     pub name: String,
-    /// Scans it had.
     pub num_scans: u64,
     /// Sequence numbers of its keyframes.
     pub keyframe_seqs: Vec<u64>,
 }
 
 /// Writes a version into fresh keys; it does not serve yet.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn write_map(
     site: &Site,
     map: &SiteMap,
@@ -99,9 +94,6 @@ async fn commit_when_large(store: &dyn SiteStore, batch: &mut Batch) -> Result<(
 }
 
 /// Makes a written version the serving one, in one step, and drops versions beyond those kept.
-///
-/// # Errors
-/// Those of the storage.
 pub async fn serve_map(site: &Site, version: MapVersion, num_kept: usize) -> Result<(), AppError> {
     site.change(|record, _| {
         record.map_version = version;

@@ -75,9 +75,6 @@ impl App {
     }
 
     /// Ends a run: what the translator held back is brought out and stored.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn finish_run(self: &Arc<Self>, site: Arc<Site>, run: &Name) -> Result<Run, AppError> {
         let writer = site.writer(run, self.config().limits.num_batches_per_run_max).await?;
         let app = Arc::clone(self);

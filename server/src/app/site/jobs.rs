@@ -21,7 +21,6 @@ const NUM_ENDED_KEPT: usize = 100;
 /// A job as it stands, with its progress.
 #[derive(Clone, Debug)]
 pub struct JobInfo {
-    /// Its record.
     pub record: JobRecord,
     /// From 0 to 1.
     pub progress: f64,
@@ -71,9 +70,6 @@ impl JobTable {
 
 impl Jobs {
     /// Reads the jobs of earlier processes; what they left unfinished is queued again or failed.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn load(store: &dyn SiteStore) -> Result<Self, AppError> {
         let jobs = Self::default();
         let mut batch = Batch::default();
@@ -159,9 +155,6 @@ impl Jobs {
     }
 
     /// Stores how far a job is, and forgets the oldest of too many ended ones.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn store(&self, store: &dyn SiteStore, record: &JobRecord) -> Result<(), AppError> {
         if let Some((known, _)) = self.table().jobs.get_mut(&record.id) {
             known.clone_from(record);

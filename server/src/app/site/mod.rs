@@ -30,7 +30,7 @@ pub use state::{SiteState, TextConfig};
 pub use texts::{Segment, SiteTexts};
 pub use translation::RunTranslator;
 
-/// An open site.
+/// A site that is open.
 pub struct Site {
     name: Name,
     store: Arc<dyn SiteStore>,
@@ -51,9 +51,7 @@ pub struct Site {
 /// What a site is and holds.
 #[derive(Clone, Debug)]
 pub struct SiteInfo {
-    /// Its name.
     pub name: Name,
-    /// Its record.
     pub record: SiteRecord,
     /// The engine's configuration in it.
     pub config: Arc<EngineConfig>,
@@ -89,7 +87,6 @@ impl Site {
         })
     }
 
-    /// Its name.
     pub fn name(&self) -> &Name {
         &self.name
     }
@@ -100,9 +97,6 @@ impl Site {
     }
 
     /// Its storage as of now; later writes do not show in it.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub(in crate::app) async fn snapshot(&self) -> Result<SiteReader, AppError> {
         let generation = self.generation();
         Ok(SiteReader::new(self.store.snapshot().await?, generation))
@@ -124,9 +118,6 @@ impl Site {
     }
 
     /// Makes another text generation, written with its own partition, the serving one.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub(in crate::app) async fn serve_generation(
         &self,
         generation: Generation,
@@ -176,9 +167,6 @@ impl Site {
     }
 
     /// Up to `limit` runs from number `from` on, in the order of their making.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<Vec<Run>, AppError> {
         let end = from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX));
         let reader = self.reader();
@@ -227,9 +215,6 @@ impl Site {
     }
 
     /// Numbers of the versions that are kept, oldest first.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn map_versions(&self) -> Result<Vec<MapVersion>, AppError> {
         let serving = self.state().record.map_version;
         let versions = self.reader().map_versions().await?;
@@ -242,17 +227,11 @@ impl Site {
     }
 
     /// All texts as they stand, indexed.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub(in crate::app) async fn text_segments(&self) -> Result<Vec<Arc<Segment>>, AppError> {
         self.texts.segments(&self.store, &self.state().record).await
     }
 
     /// What it holds, counted over the heads of its runs.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn info(&self) -> Result<SiteInfo, AppError> {
         let state = self.state();
         let num_runs = state.record.num_runs;

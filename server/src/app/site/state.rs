@@ -12,7 +12,6 @@ use crate::storage::StorageError;
 /// The record as it stands in storage.
 #[derive(Clone, Debug)]
 pub struct SiteState {
-    /// The record.
     pub record: SiteRecord,
     /// The engine's configuration in it.
     pub config: Arc<EngineConfig>,
@@ -57,7 +56,6 @@ fn stored_config(json: &str) -> Result<EngineConfig, serde_json::Error> {
 /// All that decides what text a run becomes.
 #[derive(Clone, Debug)]
 pub struct TextConfig {
-    /// The site's configuration.
     pub engine: Arc<EngineConfig>,
     /// The partition of densities that the generation is written with, when it is not the configured one.
     pub quantizer: Option<Quantizer>,

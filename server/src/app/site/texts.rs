@@ -25,7 +25,6 @@ const MERGE_RATIO: usize = 2;
 pub struct Segment {
     /// The runs, in the order of the index.
     pub runs: Vec<RunIdx>,
-    /// Their texts.
     pub index: OccurrenceIndex,
 }
 
@@ -52,9 +51,6 @@ struct GrowingText {
 
 impl SiteTexts {
     /// All texts of the serving generation as they stand, indexed.
-    ///
-    /// # Errors
-    /// Those of the storage.
     pub async fn segments(
         &self,
         store: &Arc<dyn SiteStore>,
