@@ -28,7 +28,7 @@ step "valid OpenAPI 3.1"
 "$bin/openapi-spec-validator" openapi/openapi.json
 
 step "a filled server"
-"$program" simulate --world server/worlds/office.yaml --wander 60 --seed 3 --out "$work/drive" >/dev/null
+"$program" simulate --world clients/cli/worlds/office.yaml --wander 60 --seed 3 --out "$work/drive" >/dev/null
 "$program" serve --address 127.0.0.1:0 --data-directory "$work/data" >"$work/serve.log" 2>&1 &
 server=$!
 for _ in $(seq 100); do
@@ -42,7 +42,7 @@ curl --silent --show-error --fail -X POST "$url/v1/sites/office/builds?wait=true
 
 step "a Python client, made and used"
 (cd "$work" && "$bin/openapi-python-client" generate --path "$OLDPWD/openapi/openapi.json" --meta none \
-    --output-path "$work/locution_api" --fail-on-warning >/dev/null)
+    --output-path "$work/locution_api" --config "$OLDPWD/openapi/check/python.yaml" >/dev/null)
 cp openapi/check/use_client.py "$work/"
 (cd "$work" && "$bin/mypy" --no-error-summary use_client.py && "$bin/python" use_client.py "$url")
 
@@ -59,7 +59,7 @@ cp -r clients/typescript/{package.json,tsconfig.json,src,example} "$work/typescr
 
 step "schemathesis"
 "$bin/schemathesis" --config-file openapi/check/schemathesis.toml run openapi/openapi.json --url "$url" \
-    --max-examples "${LOCUTION_CHECK_EXAMPLES:-15}" --max-time 150 --seed 1
+    --max-examples "${LOCUTION_CHECK_EXAMPLES:-15}" --max-time ${LOCUTION_CHECK_SECONDS:-150} --seed 1
 kill -0 "$server" || { echo "the server did not survive" >&2; tail -50 "$work/serve.log" >&2; exit 1; }
 ! grep -i panicked "$work/serve.log"
 step "done"

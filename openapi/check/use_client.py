@@ -7,7 +7,7 @@ from locution_api.api.maps import get_grid_pgm, list_matches
 from locution_api.api.runs import list_scans
 from locution_api.api.sites import get_site, make_site
 from locution_api.api.texts import query_words
-from locution_api.models import MatchPage, NewSite, Problem, ScanPage, Site, WordPattern, WordQuery
+from locution_api.models import MatchPage, NewSite, Problem, StoredScanPage, Site, WordPattern, WordQuery
 from locution_api.types import File
 
 
@@ -17,7 +17,7 @@ def main(url: str) -> None:
     assert isinstance(site, Site) and site.num_scans > 0, site
 
     scans = list_scans.sync("office", "drive", client=client, limit=5)
-    assert isinstance(scans, ScanPage) and len(scans.items) == 5, scans
+    assert isinstance(scans, StoredScanPage) and len(scans.items) == 5, scans
 
     matches = list_matches.sync("office", client=client, limit=3)
     assert isinstance(matches, MatchPage), matches
