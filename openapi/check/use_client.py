@@ -7,7 +7,7 @@ from locution_api.api.maps import get_grid_pgm, list_matches
 from locution_api.api.runs import list_scans
 from locution_api.api.sites import get_site, make_site
 from locution_api.api.texts import query_words
-from locution_api.models import MatchPage, NewSite, Problem, StoredScanPage, Site, WordPattern, WordQuery
+from locution_api.models import MatchPage, NewSite, Problem, Site, SiteSummary, StoredScanPage, WordPattern, WordQuery
 from locution_api.types import File
 
 
@@ -30,7 +30,7 @@ def main(url: str) -> None:
     assert isinstance(grid, File) and grid.payload.read(2) == b"P5", grid
 
     made = make_site.sync("another", client=client, body=NewSite())
-    assert isinstance(made, Site), made
+    assert isinstance(made, SiteSummary), made
     missing = get_site.sync("nowhere", client=client)
     assert isinstance(missing, Problem) and missing.status == 404, missing
     print(f"{site.site}: {site.num_scans} scans, {len(matches.items)} matches seen, {len(answers)} places")
