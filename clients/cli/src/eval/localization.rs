@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::local_server::{LocalServer, SITE, build_map};
-use crate::upload::{UploadOptions, progress_bar, upload_recording};
+use crate::upload::{UploadOptions, open_run, progress_bar, upload_recording};
 use crate::wire::{wire_geometry, wire_scan};
 use locution_lab::recordings::{Recording, read_recording, read_truth};
 use locution_lab::report::write_json;
@@ -165,9 +165,11 @@ pub(super) async fn build(
 ) -> Result<Vec<(Pose2, Pose2)>> {
     server.client.put_site(SITE, config).await?;
     let name = map.recording.name.as_str();
-    let bar = progress_bar(&indicatif::MultiProgress::new(), name, map.recording.log.scans.len());
+    let bar = progress_bar(name, map.recording.log.scans.len());
     let options = UploadOptions::default();
-    upload_recording(&server.client, (SITE, name, name), &map.recording.log, &options, &bar).await?;
+    let upload = open_run(&server.client, (SITE, name, name), &map.recording.log, &options).await?;
+    upload_recording(&server.client, (SITE, name), upload, &map.recording.log, &options, &bar).await?;
+    bar.finish();
     build_map(server).await?;
     let trajectory = server.client.trajectory(SITE, name, Frame::Map, None).await?;
     let pairs = trajectory.poses.iter().filter_map(|pose| {

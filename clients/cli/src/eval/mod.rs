@@ -9,6 +9,7 @@ mod localization;
 mod map;
 mod query;
 pub mod recognition;
+mod robust;
 
 /// Prints tables and writes JSON.
 #[derive(Debug, Args)]
@@ -29,6 +30,8 @@ enum What {
     Localization(localization::LocalizationArguments),
     /// Short recordings that are not stored: found in the map, or honestly not here.
     Query(query::QueryArguments),
+    /// Pose graphs with forged closures: how often the optimizer is not misled.
+    Robust(robust::RobustArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
     Thesis(locution_lab::thesis::ThesisArguments),
 }
@@ -46,6 +49,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Labels(arguments) => labels::run(arguments).await,
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
+            What::Robust(arguments) => robust::run(arguments),
             What::Thesis(arguments) => locution_lab::thesis::run(arguments),
         }
     })

@@ -13,6 +13,7 @@ mod localization;
 mod map_error;
 mod recognition;
 mod revisits;
+mod spoiled_graphs;
 mod summary;
 mod trajectory_error;
 mod truth_join;
@@ -28,6 +29,7 @@ pub use recognition::{
     judge_recognition,
 };
 pub use revisits::{JudgedRun, Revisits, Visit, find_revisits};
+pub use spoiled_graphs::{Generator, OutlierDraw, rms_error_m, spoil};
 pub use summary::MeanSd;
 pub use trajectory_error::{TrajectoryError, judge_trajectory};
 pub use truth_join::{OdometryPose, join_truth};

@@ -21,6 +21,7 @@ mod run;
 mod world;
 
 pub use config::{DriveConfig, LaserConfig, OdometryNoise, PeopleConfig, SimulationConfig};
+pub(crate) use gaussian::standard_normal;
 pub use planner::{PlanError, Planner};
 pub use ray_cast::Disc;
 pub use run::{SimulatedRun, SimulationError, Task, simulate_run};
