@@ -10,7 +10,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use clap::Args;
 use futures::future::try_join_all;
-use locution_client::Client;
+use locution_client::{Client, Frame, MatchFilter, MatchState};
 use locution_engine::formats::{CarmenLog, parse_map_server_yaml};
 use locution_engine::geometry::{Point2, Pose2};
 use locution_lab::evaluation::{JudgedMatch, TrajectoryError, judge_recognition, judge_trajectory};
@@ -231,12 +231,13 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
         let observations = client.observations(SITE, &recording.name).await?;
         runs.push(judged_run(recording, &observations, &run.truth, 0));
     }
-    let matches = client.matches(SITE, "").await?;
+    let matches = client.matches(SITE, &MatchFilter::default()).await?;
     let judged: Vec<JudgedMatch> = matches.iter().filter_map(|found| judged_match(found, &names)).collect();
     let recognition = judge_recognition(&runs, &judged);
     let num_verified = judged.iter().filter(|found| found.is_verified).count();
-    let num_between =
-        matches.iter().filter(|found| found.state == "verified" && found.earlier.run != found.later.run);
+    let num_between = matches
+        .iter()
+        .filter(|found| found.state == MatchState::Verified && found.earlier.run != found.later.run);
     println!("What was recognised (against the simulator's truth)");
     println!("  candidates          {}", judged.len());
     println!("  verified matches    {num_verified}, {} of them between two robots", num_between.count());
@@ -247,8 +248,8 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
     println!("  verified precision  {:.1} %", 100.0 * recognition.verified.precision);
     println!("  verified recall     {:.1} %", 100.0 * recognition.verified.recall_all);
 
-    let before = trajectory_errors(client, &names, simulated, "odom").await?;
-    let after = trajectory_errors(client, &names, simulated, "map").await?;
+    let before = trajectory_errors(client, &names, simulated, Frame::Odom).await?;
+    let after = trajectory_errors(client, &names, simulated, Frame::Map).await?;
     let rows: Vec<Vec<String>> =
         [("odometry, each robot by itself", before), ("map, all robots together", after)]
             .into_iter()
@@ -270,7 +271,7 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
 
 /// Robots that share a frame, with their (estimated, true) poses.
 struct MapPart<'a> {
-    component: u64,
+    component: u32,
     names: Vec<&'a str>,
     pairs: Vec<(Pose2, Pose2)>,
 }
@@ -280,12 +281,12 @@ async fn trajectory_errors(
     client: &Client,
     names: &[&str],
     simulated: &[SimulatedRun],
-    frame: &str,
+    frame: Frame,
 ) -> Result<Vec<(String, TrajectoryError)>> {
     let mut parts: Vec<MapPart<'_>> = Vec::new();
     for (idx, (&name, run)) in names.iter().zip(simulated).enumerate() {
-        let trajectory = client.trajectory(SITE, name, frame).await?;
-        let component = trajectory.component.unwrap_or(idx as u64);
+        let trajectory = client.trajectory(SITE, name, frame, None).await?;
+        let component = trajectory.component.unwrap_or(idx as u32);
         let pairs = trajectory.poses.iter().filter_map(|pose| {
             let truth = run.truth.get(usize::try_from(pose.scan_seq).ok()?)?;
             Some((Pose2::new(pose.x, pose.y, pose.theta), truth.truth_from_robot))

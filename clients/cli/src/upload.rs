@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
-use locution_client::{Client, Encoding, NewRun, RunUpload, Scan};
+use locution_client::{Client, Encoding, JobState, NewRun, RunUpload, Scan};
 use locution_engine::formats::CarmenLog;
 
 use crate::wire::{wire_geometry, wire_scan};
@@ -116,17 +116,17 @@ pub async fn build_with_progress(client: &Client, site: &str) -> Result<()> {
     let bar = ProgressBar::new(1000).with_style(style).with_prefix("building the map");
     let mut job = client.start_build(site).await.context("the map cannot be built")?;
     loop {
-        match job.state.as_str() {
-            "done" => break,
-            "failed" => bail!("the map could not be built: {}", job.error.or(job.detail).unwrap_or_default()),
-            _ => {}
+        match job.state {
+            JobState::Done => break,
+            JobState::Failed => bail!("the map could not be built: {}", job.error.unwrap_or(job.detail)),
+            JobState::Queued | JobState::Running => {}
         }
         bar.set_position((1000.0 * job.progress) as u64);
-        bar.set_message(job.detail.clone().unwrap_or_default());
+        bar.set_message(job.detail.clone());
         tokio::time::sleep(Duration::from_millis(200)).await;
-        job = client.job(site, &job).await?;
+        job = client.job(site, &job.id).await?;
     }
-    bar.finish_with_message(job.detail.unwrap_or_default());
+    bar.finish_with_message(job.detail);
     Ok(())
 }
 
@@ -140,7 +140,7 @@ pub async fn open_run(
     log: &CarmenLog,
     options: &UploadOptions,
 ) -> Result<RunUpload> {
-    let new_run = NewRun { robot: robot.to_owned(), geometry: wire_geometry(&log.geometry) };
+    let new_run = NewRun { robot: Some(robot.to_owned()), geometry: wire_geometry(&log.geometry) };
     let upload = client.start_upload(site, run, &new_run, options.encoding).await;
     upload.with_context(|| format!("run {run} cannot be opened"))
 }
@@ -187,8 +187,8 @@ pub async fn upload_recording(
         bar.inc(scans.len() as u64);
     }
     if options.is_finishing {
-        client.finish_run(site, run).await.with_context(|| format!("run {run} cannot be finished"))?;
-        let status = client.run(site, run).await?;
+        let finished = client.finish_run(site, run).await;
+        let status = finished.with_context(|| format!("run {run} cannot be finished"))?;
         uploaded.num_observations = status.num_observations;
         uploaded.num_words = status.num_words;
     }

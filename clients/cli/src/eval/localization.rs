@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use locution_client::{Client, LocalizationState, NewRun, Scan};
+use locution_client::{Client, Frame, LocalizationState, NewRun, Scan};
 use locution_engine::formats::{CarmenLog, CarmenOptions};
 use locution_engine::geometry::Pose2;
 use locution_lab::evaluation::{
@@ -171,7 +171,7 @@ pub(super) async fn build(
     upload_recording(&server.client, (SITE, name), upload, &map.recording.log, &options, &bar).await?;
     bar.finish();
     build_map(server).await?;
-    let trajectory = server.client.trajectory(SITE, name, "map").await?;
+    let trajectory = server.client.trajectory(SITE, name, Frame::Map, None).await?;
     let pairs = trajectory.poses.iter().filter_map(|pose| {
         let truth = (*map.truth.get(usize::try_from(pose.scan_seq).ok()?)?)?;
         Some((truth, Pose2::new(pose.x, pose.y, pose.theta)))
@@ -201,7 +201,7 @@ async fn trial(
     limit_m: f64,
 ) -> Result<LocalizationTrial> {
     let recording = &log.recording;
-    let robot = NewRun { robot: "evaluation".into(), geometry: wire_geometry(&recording.log.geometry) };
+    let robot = NewRun { robot: Some("evaluation".into()), geometry: wire_geometry(&recording.log.geometry) };
     let opened = client.open_localization(SITE, &robot).await.context("a localisation cannot be opened")?;
     let mut next = start;
     let mut answered = None;
@@ -215,7 +215,7 @@ async fn trial(
         let answer = client.localize(SITE, &opened.id, (next - start) as u64, &scans).await?;
         next = end.min(log.travel_m.len() - 1);
         if answer.state == LocalizationState::Converged {
-            answered = answer.hypotheses.first().map(|best| (end - 1, best.pose));
+            answered = answer.hypotheses.first().map(|best| (end - 1, best.map_from_robot));
         }
         if end >= log.travel_m.len() {
             break;
