@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use futures::future::try_join_all;
-use locution_client::{Client, Encoding, RunUpload};
+use locution_client::{Client, Encoding, MapAt, RunUpload};
 use locution_engine::formats::CarmenOptions;
 
 use super::upload::{
@@ -167,9 +167,8 @@ fn summary(run: &str, uploaded: &Uploaded) -> String {
 async fn print_where_to_look(client: &Client, site: &str, is_built: bool) -> Result<()> {
     let url = client.base_url();
     if is_built {
-        let map = client.map(site).await?;
-        let parts = map["components"].as_array().map_or(0, Vec::len);
-        println!("map version {} is served, in {parts} part(s)", map["version"]);
+        let map = client.map(site, MapAt::default()).await?;
+        println!("map version {} is served, in {} part(s)", map.version, map.components.len());
     } else {
         println!("the server builds the map in the background; --wait waits for it");
     }

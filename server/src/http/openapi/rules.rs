@@ -167,7 +167,8 @@ fn type_answers(operation: &mut Node) {
 /// Formats of Rust's integers become those that generators know, with their bounds.
 fn bound_integer(schema: &mut Members) {
     let Some(format) = schema.get("format").and_then(Node::as_str) else { return };
-    let (format, minimum, maximum) = match format {
+    // utoipa writes `u-int32` for an unsigned integer.
+    let (format, minimum, maximum) = match format.replace('-', "").as_str() {
         "int8" => ("int32", i64::from(i8::MIN), i64::from(i8::MAX)),
         "uint8" => ("int32", 0, i64::from(u8::MAX)),
         "uint16" => ("int32", 0, i64::from(u16::MAX)),
@@ -206,7 +207,7 @@ mod tests {
             }}},
             "components": {"schemas": {"Pose": {"properties": {
                 "covariance": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
-                "count": {"type": "integer", "format": "uint8"},
+                "count": {"type": "integer", "format": "u-int8"},
             }}}},
         });
         apply(&mut document);
