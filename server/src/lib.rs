@@ -30,6 +30,7 @@ mod records;
 mod router;
 mod state;
 mod storage;
+pub mod upkeep;
 
 use app::App;
 use config::{ServerConfig, ServerConfigError};

@@ -22,8 +22,8 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::auth;
 use crate::error::ApiError;
 use crate::handlers::{
-    batches, changes, jobs, labels, localizations, maps, matches, operations, places, queries, runs, sites,
-    texts,
+    backups, batches, changes, jobs, labels, localizations, maps, matches, operations, places, queries, runs,
+    sites, texts,
 };
 use crate::openapi::{self, Document};
 use crate::state::AppState;
@@ -37,6 +37,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(operations::ui))
         .routes(routes!(sites::list_sites))
         .routes(routes!(sites::make_site, sites::get_site, sites::delete_site))
+        .routes(routes!(backups::backup_site, backups::restore_site))
         .routes(routes!(runs::list_runs))
         .routes(routes!(runs::make_run, runs::get_run))
         .routes(routes!(runs::finish_run))

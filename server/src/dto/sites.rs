@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::app::ListedSite;
 use crate::app::site::SiteInfo;
 
 /// Makes a site.
@@ -20,6 +21,12 @@ pub struct SiteDto {
     /// Its name.
     #[schema(example = "hospital-floor-2")]
     pub site: String,
+    /// `serving`, or `unreadable` when it cannot be opened; it can then be deleted, and the numbers are 0.
+    #[schema(example = "serving")]
+    pub state: String,
+    /// Why it is unreadable, and what can be done about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// The engine's configuration in it, complete.
     #[schema(value_type = Object)]
     pub config: serde_json::Value,
@@ -39,10 +46,39 @@ pub struct SiteDto {
     pub map_version: Option<u64>,
 }
 
+impl SiteDto {
+    /// A site of a list, whether or not it can be opened.
+    pub async fn of(listed: ListedSite) -> Self {
+        let info = match listed.site {
+            Ok(site) => site.info().await,
+            Err(error) => Err(error),
+        };
+        info.map_or_else(|error| Self::unreadable(listed.name.to_string(), error.to_string()), Self::from)
+    }
+
+    fn unreadable(site: String, reason: String) -> Self {
+        Self {
+            site,
+            state: "unreadable".into(),
+            reason: Some(reason),
+            config: serde_json::Value::Null,
+            num_runs: 0,
+            num_scans: 0,
+            num_observations: 0,
+            num_words: 0,
+            bytes_on_disk: 0,
+            generation: 0,
+            map_version: None,
+        }
+    }
+}
+
 impl From<SiteInfo> for SiteDto {
     fn from(info: SiteInfo) -> Self {
         Self {
             site: info.name.to_string(),
+            state: "serving".into(),
+            reason: None,
             config: serde_json::to_value(&*info.config).unwrap_or_default(),
             num_runs: info.record.num_runs,
             num_scans: info.num_scans,

@@ -1,5 +1,6 @@
 //! One file per resource; a handler extracts, calls one use case and wraps the answer.
 
+pub mod backups;
 pub mod batches;
 pub mod changes;
 pub mod encodings;

@@ -45,12 +45,13 @@ pub async fn list_sites(
     Params(page): Params<PageParams>,
 ) -> Result<Json<Page<SiteDto>>, ApiError> {
     let (first, limit) = (page.first()?, page.limit()?);
-    let sites = state.app.sites(|name| identity.may_see(name)).await?;
+    let sites = state.app.listed_sites(|name| identity.may_see(name)).await?;
+    let num_sites = sites.len() as u64;
     let mut items = Vec::new();
-    for site in sites.iter().skip(usize::try_from(first).unwrap_or(usize::MAX)).take(limit) {
-        items.push(SiteDto::from(site.info().await?));
+    for listed in sites.into_iter().skip(usize::try_from(first).unwrap_or(usize::MAX)).take(limit) {
+        items.push(SiteDto::of(listed).await);
     }
-    Ok(Json(Page::of(items, first, sites.len() as u64)))
+    Ok(Json(Page::of(items, first, num_sites)))
 }
 
 /// One site.
