@@ -39,9 +39,20 @@ impl TestServer {
         Self { server, directory, config, api }
     }
 
+    /// Where its data is.
+    pub fn directory(&self) -> &std::path::Path {
+        self.directory.path()
+    }
+
     /// Stops it in order and starts it again over the same directory.
     pub async fn restart(self) -> Self {
+        self.restart_after(|| {}).await
+    }
+
+    /// The same, with something done to the directory in between.
+    pub async fn restart_after(self, meanwhile: impl FnOnce()) -> Self {
         self.server.shutdown().await.unwrap();
+        meanwhile();
         let server = start_server(self.config.clone()).await.unwrap();
         let api = Api { base: server.url(), ..self.api };
         Self { server, directory: self.directory, config: self.config, api }

@@ -103,6 +103,10 @@ pub async fn authorize(State(state): State<AppState>, mut request: Request, next
 
 /// Looking and asking is reading, making and deleting sites is for administrators, the rest is writing.
 fn needed_scope(method: &Method, segments: &[&str]) -> Scope {
+    // A backup holds the whole site, and restoring makes one.
+    if segments.len() == 4 && segments[3] == "backup" {
+        return Scope::Admin;
+    }
     let is_question = segments.iter().any(|segment| ["queries", "localisations"].contains(segment));
     if method == Method::GET || method == Method::HEAD || is_question {
         return Scope::Read;
@@ -138,6 +142,8 @@ mod tests {
         assert_eq!(needed(Method::GET, "v1/sites/a"), Scope::Read);
         assert_eq!(needed(Method::POST, "v1/sites/a/queries/words"), Scope::Read);
         assert_eq!(needed(Method::DELETE, "v1/sites/a"), Scope::Admin);
+        assert_eq!(needed(Method::GET, "v1/sites/a/backup"), Scope::Admin);
+        assert_eq!(needed(Method::PUT, "v1/sites/a/backup"), Scope::Admin);
         assert_eq!(needed(Method::PUT, "v1/sites/a/runs/r"), Scope::Write);
         assert_eq!(needed(Method::POST, "v1/sites/a/runs/r/batches"), Scope::Write);
     }

@@ -154,6 +154,11 @@ impl From<StorageError> for ApiError {
         match error {
             StorageError::Conflict | StorageError::Fenced => unavailable(1),
             StorageError::Unavailable { retry_after, .. } => unavailable(retry_after.as_secs().max(1)),
+            StorageError::Held { .. } => unavailable(5),
+            StorageError::Full { .. } => {
+                Self::new(StatusCode::INSUFFICIENT_STORAGE, "full", "The storage is full", detail)
+                    .retry_after(30)
+            }
             StorageError::Corrupt { .. } | StorageError::ValueTooLarge { .. } => {
                 tracing::error!(error = detail, "the storage failed");
                 Self::new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Corrupt data", detail)

@@ -28,6 +28,7 @@ mod records;
 mod router;
 mod state;
 mod storage;
+pub mod upkeep;
 
 pub use http::openapi::document_json;
 

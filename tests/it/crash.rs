@@ -16,13 +16,13 @@ const NUM_KILLS: usize = 20;
 const NUM_SCANS_PER_BATCH: usize = 20;
 
 /// A server process; killed when dropped.
-struct Process {
+pub(crate) struct Process {
     child: Child,
     api: Api,
 }
 
 impl Process {
-    fn start(binary: &Path, directory: &Path) -> Self {
+    pub(crate) fn start(binary: &Path, directory: &Path) -> Self {
         let mut child = Command::new(binary)
             .args(["serve", "--address", "127.0.0.1:0", "--data-directory"])
             .arg(directory)
@@ -40,8 +40,18 @@ impl Process {
         Self { child, api }
     }
 
+    /// Speaks to it.
+    pub(crate) fn api(&self) -> &Api {
+        &self.api
+    }
+
+    /// Its number in the system.
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// SIGKILL: no destructor, no flush, no goodbye.
-    fn kill(&mut self) {
+    pub(crate) fn kill(&mut self) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();
     }

@@ -13,6 +13,7 @@ mod replay;
 mod serve;
 mod shell;
 mod simulate;
+mod upkeep;
 mod upload;
 mod wire;
 
@@ -28,6 +29,12 @@ struct Arguments {
 enum Command {
     /// Start the server.
     Serve(serve::ServeArguments),
+    /// Read everything in a data directory and say what is damaged.
+    Check(upkeep::CheckArguments),
+    /// Keep what can be read of a damaged site, and say what was lost.
+    Repair(upkeep::SiteArguments),
+    /// Write a site anew without its garbage.
+    Compact(upkeep::SiteArguments),
     /// Let three simulated robots map an office floor, and show what was recognised.
     Demo(demo::DemoArguments),
     /// Post recordings to a running server.
@@ -52,6 +59,9 @@ fn main() -> ExitCode {
     environment::warn_of_unknown_variables();
     let outcome = match command {
         Command::Serve(arguments) => serve::run(arguments),
+        Command::Check(arguments) => upkeep::check(&arguments),
+        Command::Repair(arguments) => upkeep::repair(&arguments),
+        Command::Compact(arguments) => upkeep::compact(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),

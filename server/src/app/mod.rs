@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! sites   made, found, described, deleted
+//! backups a site as a stream, and a site made of one
 //! runs    a batch ─► the run's one writer ─► translator ─► one commit ─► receipt;  trajectories
 //! jobs    in the background: maps are built, texts written anew
 //! maps    versions written and served: regions, matches, labels, places, changes, grids, pictures
@@ -26,7 +27,10 @@ use crate::config::ServerConfig;
 use crate::storage::Storage;
 
 pub mod ask;
+pub mod backups;
 mod error;
+#[cfg(test)]
+mod faults;
 mod jobs;
 pub mod maps;
 mod names;
@@ -36,6 +40,7 @@ mod sites;
 
 pub use error::AppError;
 pub use names::Name;
+pub use sites::ListedSite;
 
 use ask::{Localizations, PlaceIndexes};
 use maps::GridKey;
@@ -103,9 +108,9 @@ impl App {
     /// # Errors
     /// Those of the storage as a whole.
     pub async fn resume(self: &Arc<Self>) -> Result<(), AppError> {
-        for name in self.storage.list().await? {
-            if let Err(error) = self.site(&Name::new(&name, "site")?).await {
-                tracing::error!(site = name, %error, "the site cannot be opened");
+        for listed in self.listed_sites(|_| true).await? {
+            if let Err(error) = listed.site {
+                tracing::error!(site = %listed.name, %error, "the site cannot be opened");
             }
         }
         Ok(())

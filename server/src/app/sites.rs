@@ -3,11 +3,26 @@
 use std::sync::{Arc, PoisonError};
 
 use locution_engine::config::EngineConfig;
+use rand::TryRng;
+use rand::rngs::SysRng;
 
 use super::site::Site;
 use super::{App, AppError, Name};
-use crate::records::{Key, SiteRecord, codec};
+use crate::records::{Key, SiteRecord};
 use crate::storage::{Batch, Precondition};
+
+/// A site in a list.
+pub struct ListedSite {
+    /// Its name.
+    pub name: Name,
+    /// The site, or why it cannot be opened.
+    pub site: Result<Arc<Site>, AppError>,
+}
+
+/// Nothing but chance tells a site from another of the same name.
+pub(super) fn new_birth() -> Result<u64, AppError> {
+    SysRng.try_next_u64().map_err(AppError::internal)
+}
 
 /// Indexes the texts of a site in the background, so that the first question need not wait for it.
 fn index_texts(site: &Arc<Site>) {
@@ -59,10 +74,11 @@ impl App {
             map_version: 0,
             next_job: 1,
             next_decision: 1,
+            birth: new_birth()?,
         };
         let store = self.storage.open(name.as_str()).await?;
         let mut batch = Batch::default();
-        batch.put(Key::Site.encode(), codec::encode(&record));
+        batch.put(Key::Site.encode(), record.encode());
         store.commit(batch, vec![Precondition { key: Key::Site.encode(), expected: None }]).await?;
         self.site(name).await
     }
@@ -84,28 +100,44 @@ impl App {
             return Err(AppError::not_found("site", name));
         }
         let store = self.storage.open(name.as_str()).await?;
-        let site = Arc::new(Site::open(name, store).await?);
+        let site = Arc::new(Site::open(name, store, new_birth()?).await?);
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
         self.work_on(&site);
         index_texts(&site);
         Ok(site)
     }
 
-    /// All sites that `is_wanted`, by name.
+    /// All sites that `is_wanted`, by name, those that cannot be opened left out.
+    ///
+    /// # Errors
+    /// Those of the storage as a whole.
     pub async fn sites(
         self: &Arc<Self>,
         is_wanted: impl Fn(&str) -> bool,
     ) -> Result<Vec<Arc<Site>>, AppError> {
+        let listed = self.listed_sites(is_wanted).await?;
+        Ok(listed.into_iter().filter_map(|listed| listed.site.ok()).collect())
+    }
+
+    /// All sites that `is_wanted`, by name; of those that cannot be opened, why not.
+    ///
+    /// # Errors
+    /// Those of the storage as a whole.
+    pub async fn listed_sites(
+        self: &Arc<Self>,
+        is_wanted: impl Fn(&str) -> bool,
+    ) -> Result<Vec<ListedSite>, AppError> {
         let mut sites = Vec::new();
         for name in self.storage.list().await? {
-            if !is_wanted(&name) {
+            // A directory whose name no site can have is not ours.
+            let Ok(name) = Name::new(&name, "site") else { continue };
+            if !is_wanted(name.as_str()) {
                 continue;
             }
-            match self.site(&Name::new(&name, "site")?).await {
-                Ok(site) => sites.push(site),
+            match self.site(&name).await {
                 // Deleted between the listing and now, or its making was cut short.
                 Err(AppError::NotFound { .. }) => {}
-                Err(error) => return Err(error),
+                site => sites.push(ListedSite { name, site }),
             }
         }
         Ok(sites)
@@ -117,8 +149,32 @@ impl App {
     /// [`AppError::NotFound`].
     pub async fn delete_site(self: &Arc<Self>, name: &Name) -> Result<(), AppError> {
         let _queue = self.making_sites.lock().await;
-        self.site(name).await?;
+        // A site that cannot be opened can still be deleted.
+        if let Err(AppError::NotFound { kind, name }) = self.site(name).await {
+            return Err(AppError::NotFound { kind, name });
+        }
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
         Ok(self.storage.delete(name.as_str()).await?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::ServerConfig;
+    use crate::storage::{MemoryStorage, Storage};
+
+    #[tokio::test]
+    async fn a_site_made_again_is_another_one_and_a_reopened_one_the_same() {
+        let storage: Arc<dyn Storage> = Arc::new(MemoryStorage::default());
+        let app = Arc::new(App::new(ServerConfig::default(), Arc::clone(&storage)));
+        let name = Name::new("s", "site").unwrap();
+        let (first, _) = app.make_site(&name, None).await.unwrap();
+        let reopened = Arc::new(App::new(ServerConfig::default(), storage));
+        let again = reopened.site(&name).await.unwrap();
+        assert_eq!(again.state().record.birth, first.state().record.birth);
+        app.delete_site(&name).await.unwrap();
+        let (second, _) = app.make_site(&name, None).await.unwrap();
+        assert_ne!(second.state().record.birth, first.state().record.birth);
     }
 }

@@ -5,8 +5,8 @@ use utoipa_axum::routes;
 
 use super::forms;
 use super::resources::{
-    batches, changes, jobs, labels, localizations, maps, matches, operations, places, runs, sites, texts,
-    word_queries,
+    backups, batches, changes, jobs, labels, localizations, maps, matches, operations, places, runs, sites,
+    texts, word_queries,
 };
 use crate::state::AppState;
 
@@ -19,6 +19,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(operations::ui))
         .routes(routes!(sites::list_sites))
         .routes(routes!(sites::make_site, sites::get_site, sites::delete_site))
+        .routes(routes!(backups::backup_site, backups::restore_site))
         .routes(routes!(runs::list_runs))
         .routes(routes!(runs::make_run, runs::get_run))
         .routes(routes!(runs::finish_run))

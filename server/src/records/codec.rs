@@ -13,13 +13,18 @@ use serde::de::DeserializeOwned;
 
 use crate::storage::StorageError;
 
-/// Version of every record layout of this room; raised when one changes incompatibly.
+/// Version of every record layout that names no other.
 pub const VERSION: u8 = 1;
 const HEADER_BYTES: usize = 5;
 
 /// The stored form of a value.
 pub fn encode<T: Serialize>(value: &T) -> Bytes {
-    let header = vec![VERSION, 0, 0, 0, 0];
+    encode_as(VERSION, value)
+}
+
+/// The stored form of a value whose layout has a version of its own.
+pub fn encode_as<T: Serialize>(version: u8, value: &T) -> Bytes {
+    let header = vec![version, 0, 0, 0, 0];
     let mut bytes =
         postcard::to_extend(value, header).expect("records are plain data that postcard can always write");
     let checksum = checksum(bytes[0], &bytes[HEADER_BYTES..]);
@@ -32,18 +37,35 @@ pub fn encode<T: Serialize>(value: &T) -> Bytes {
 /// # Errors
 /// [`StorageError::Corrupt`] when the bytes are short, damaged, or of another version.
 pub fn decode<T: DeserializeOwned>(bytes: &[u8], what: &str) -> Result<T, StorageError> {
+    decode_as(VERSION, bytes, what)
+}
+
+/// The layout version of a stored value, before its checksum is looked at.
+pub fn version_of(bytes: &[u8]) -> Option<u8> {
+    bytes.first().copied()
+}
+
+/// The value behind the stored form of a layout version.
+///
+/// # Errors
+/// [`StorageError::Corrupt`] when the bytes are short, damaged, or of another version.
+pub fn decode_as<T: DeserializeOwned>(version: u8, bytes: &[u8], what: &str) -> Result<T, StorageError> {
     let corrupt = |problem: &str| StorageError::Corrupt { what: format!("{what}: {problem}") };
-    let Some((header, payload)) = bytes.split_first_chunk::<HEADER_BYTES>() else {
-        return Err(corrupt("too short"));
-    };
-    let stored = u32::from_le_bytes([header[1], header[2], header[3], header[4]]);
-    if stored != checksum(header[0], payload) {
-        return Err(corrupt("the checksum does not match"));
-    }
-    if header[0] != VERSION {
-        return Err(corrupt(&format!("layout version {} is not known", header[0])));
+    let payload = verify(bytes).map_err(corrupt)?;
+    if bytes[0] != version {
+        return Err(corrupt(&format!("layout version {} is not known", bytes[0])));
     }
     postcard::from_bytes(payload).map_err(|error| corrupt(&error.to_string()))
+}
+
+/// The payload behind a stored form whose checksum is right, of whatever layout.
+///
+/// # Errors
+/// What is wrong with it.
+pub fn verify(bytes: &[u8]) -> Result<&[u8], &'static str> {
+    let (header, payload) = bytes.split_first_chunk::<HEADER_BYTES>().ok_or("too short")?;
+    let stored = u32::from_le_bytes([header[1], header[2], header[3], header[4]]);
+    if stored == checksum(header[0], payload) { Ok(payload) } else { Err("the checksum does not match") }
 }
 
 fn checksum(version: u8, payload: &[u8]) -> u32 {

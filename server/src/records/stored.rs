@@ -1,10 +1,16 @@
 //! Plain data of a site, its runs and its jobs, stored by [`super::codec`]; postcard keeps the order of fields.
 
+use bytes::Bytes;
 use locution_engine::geometry::Pose2;
 use locution_engine::scan::ScanGeometry;
 use serde::{Deserialize, Serialize};
 
+use super::codec;
 use super::keys::{Generation, MapVersion, RunIdx};
+use crate::storage::StorageError;
+
+/// The layout of [`SiteRecord`]; 1 had no birth.
+const SITE_LAYOUT: u8 = 2;
 
 /// `Key::Site`: what the site is and what of it serves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +29,55 @@ pub struct SiteRecord {
     pub next_job: u64,
     /// The number of the next decision.
     pub next_decision: u64,
+    /// Drawn at random when the site was made: a site that is deleted and made again under the same name is another
+    /// one, and nothing that was kept of the first may be served for the second.
+    pub birth: u64,
+}
+
+/// [`SiteRecord`] as sites stored it before they had a birth.
+#[derive(Serialize, Deserialize)]
+struct SiteRecord1 {
+    config_json: String,
+    num_runs: RunIdx,
+    generation: Generation,
+    quantizer_json: Option<String>,
+    map_version: MapVersion,
+    next_job: u64,
+    next_decision: u64,
+}
+
+impl SiteRecord {
+    /// The stored form.
+    pub fn encode(&self) -> Bytes {
+        codec::encode_as(SITE_LAYOUT, self)
+    }
+
+    /// The record behind its stored form; a site of the first layout, which has no birth yet, is given one.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`].
+    pub fn decode(bytes: &[u8], birth_if_none: u64) -> Result<Self, StorageError> {
+        let what = "the record of the site";
+        if codec::version_of(bytes) != Some(1) {
+            return codec::decode_as(SITE_LAYOUT, bytes, what);
+        }
+        let old: SiteRecord1 = codec::decode_as(1, bytes, what)?;
+        Ok(Self {
+            config_json: old.config_json,
+            num_runs: old.num_runs,
+            generation: old.generation,
+            quantizer_json: old.quantizer_json,
+            map_version: old.map_version,
+            next_job: old.next_job,
+            next_decision: old.next_decision,
+            birth: birth_if_none,
+        })
+    }
+
+    /// Whether a stored form is of an older layout and should be written again.
+    pub fn is_outdated(bytes: &[u8]) -> bool {
+        codec::version_of(bytes) == Some(1)
+    }
 }
 
 /// `Key::Run`: what a run is.
@@ -135,4 +190,29 @@ pub struct JobRecord {
     /// What it is at, or what came of it.
     pub detail: String,
     pub error: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_site_of_the_first_layout_is_read_and_given_a_birth() {
+        let old = SiteRecord1 {
+            config_json: "{}".into(),
+            num_runs: 3,
+            generation: 1,
+            quantizer_json: None,
+            map_version: 2,
+            next_job: 5,
+            next_decision: 7,
+        };
+        let bytes = codec::encode_as(1, &old);
+        assert!(SiteRecord::is_outdated(&bytes));
+        let record = SiteRecord::decode(&bytes, 42).unwrap();
+        assert_eq!((record.num_runs, record.map_version, record.birth), (3, 2, 42));
+        let again = record.encode();
+        assert!(!SiteRecord::is_outdated(&again));
+        assert_eq!(SiteRecord::decode(&again, 43).unwrap(), record);
+    }
 }

@@ -208,15 +208,16 @@ async fn values_are_bounded() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn sled_keeps_what_was_committed_and_refuses_a_second_owner() {
+async fn sled_keeps_what_was_committed_and_refuses_a_second_holder() {
     let directory = tempfile::tempdir().unwrap();
     let first = sled_in(directory.path());
     let site = first.open("a").await.unwrap();
     site.commit(batch_of(&[("k", Some("kept"))]), vec![]).await.unwrap();
-    let second = sled_in(directory.path());
-    assert!(matches!(second.open("a").await, Err(StorageError::Unavailable { .. })));
+    let config = SledConfig { directory: directory.path().to_owned(), cache_bytes_per_site: 1 << 20 };
+    assert!(matches!(SledStorage::new(config), Err(StorageError::Held { .. })));
     first.close().await.unwrap();
     drop((site, first));
+    let second = sled_in(directory.path());
     let site = second.open("a").await.unwrap();
     assert_eq!(site.get(b"k").await.unwrap().as_deref(), Some(&b"kept"[..]));
 }

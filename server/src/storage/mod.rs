@@ -18,12 +18,28 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use thiserror::Error;
 
+pub mod backup;
+mod content;
 #[cfg(test)]
 mod contract;
 #[cfg(test)]
+mod damage;
+mod data_directory;
+#[cfg(test)]
+pub(crate) mod faulty;
+mod files;
+mod ledger;
+#[cfg(test)]
 mod memory;
+mod sled_database;
 mod sled_flusher;
+mod sled_log;
+mod sled_open;
+mod sled_rewrite;
+mod sled_site;
+mod sled_snapshot;
 mod sled_store;
+pub mod upkeep;
 
 #[cfg(test)]
 pub use memory::MemoryStorage;
@@ -50,6 +66,20 @@ pub enum StorageError {
         /// When to ask again.
         retry_after: Duration,
         /// What the engine said.
+        reason: String,
+    },
+    /// Another process holds the directory of the embedded storage.
+    #[error("the data directory {directory} is held by {holder}")]
+    Held {
+        /// The directory.
+        directory: String,
+        /// Which process on which machine, and since when.
+        holder: String,
+    },
+    /// There is no room for more; reading goes on, and so does writing once there is room again.
+    #[error("the storage is full: {reason}")]
+    Full {
+        /// How much room there is and how much is needed.
         reason: String,
     },
     /// A stored value or the database itself is damaged.
@@ -157,4 +187,12 @@ pub trait Storage: Send + Sync {
 
     /// Closes everything in order; later calls answer [`StorageError::Unavailable`].
     async fn close(&self) -> Result<(), StorageError>;
+}
+
+fn unavailable(error: &dyn std::fmt::Display) -> StorageError {
+    StorageError::Unavailable { retry_after: Duration::from_secs(5), reason: error.to_string() }
+}
+
+fn closed() -> StorageError {
+    unavailable(&"the server is shutting down")
 }

@@ -44,6 +44,7 @@ impl Progress {
         f64::from(self.permille.load(Ordering::Relaxed)) / 1000.0
     }
 
+    /// What is being done.
     pub fn detail(&self) -> String {
         self.detail.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
@@ -87,7 +88,7 @@ impl Jobs {
             jobs.insert(record);
         }
         if !batch.writes.is_empty() {
-            store.commit(batch, vec![]).await?;
+            store.commit(batch, vec![]).await.map_err(AppError::from).or_else(super::unless_full)?;
         }
         Ok(jobs)
     }

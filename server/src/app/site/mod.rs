@@ -66,15 +66,20 @@ pub struct SiteInfo {
 }
 
 impl Site {
-    /// Opens what a storage holds of a site.
+    /// Opens what a storage holds of a site; one from before sites had a birth is given one.
     ///
     /// # Errors
     /// [`AppError::NotFound`] when its record is missing; [`StorageError::Corrupt`] when it cannot be read.
-    pub(in crate::app) async fn open(name: &Name, store: Arc<dyn SiteStore>) -> Result<Self, AppError> {
+    pub(in crate::app) async fn open(
+        name: &Name,
+        store: Arc<dyn SiteStore>,
+        birth_if_none: u64,
+    ) -> Result<Self, AppError> {
         let bytes = store.get(&Key::Site.encode()).await?.ok_or_else(|| AppError::not_found("site", name))?;
-        Ok(Self {
+        let is_outdated = SiteRecord::is_outdated(&bytes);
+        let site = Self {
             name: name.clone(),
-            state: RwLock::new(Arc::new(SiteState::decode(bytes)?)),
+            state: RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?)),
             jobs: Jobs::load(&*store).await?,
             store,
             writers: Mutex::default(),
@@ -84,7 +89,12 @@ impl Site {
             build_requests: AtomicU64::new(0),
             memo: Mutex::default(),
             texts: SiteTexts::default(),
-        })
+        };
+        if is_outdated {
+            // The birth just drawn must be the same after the next start.
+            site.change(|_, _| Ok(())).await.or_else(unless_full)?;
+        }
+        Ok(site)
     }
 
     pub fn name(&self) -> &Name {
@@ -145,13 +155,27 @@ impl Site {
         let mut record = before.record.clone();
         let mut batch = Batch::default();
         let answer = change(&mut record, &mut batch)?;
-        let bytes = codec::encode(&record);
+        let bytes = record.encode();
         batch.put(Key::Site.encode(), bytes.clone());
         let unchanged = Precondition { key: Key::Site.encode(), expected: Some(before.bytes.clone()) };
-        self.store.commit(batch, vec![unchanged]).await?;
-        let state = SiteState { record, config: Arc::clone(&before.config), bytes };
-        *self.state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(state);
+        if let Err(error) = self.store.commit(batch, vec![unchanged]).await {
+            self.reload(&before).await?;
+            return Err(error.into());
+        }
+        self.put_state(SiteState { record, config: Arc::clone(&before.config), bytes });
         Ok(answer)
+    }
+
+    /// After a commit that failed the record may stand as it was or as it should have become.
+    async fn reload(&self, before: &SiteState) -> Result<(), AppError> {
+        if let Some(bytes) = self.store.get(&Key::Site.encode()).await? {
+            self.put_state(SiteState::decode(bytes, before.record.birth)?);
+        }
+        Ok(())
+    }
+
+    fn put_state(&self, state: SiteState) {
+        *self.state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(state);
     }
 
     /// A run by its name.
@@ -254,4 +278,12 @@ impl Site {
 
 fn decode_all<T: serde::de::DeserializeOwned>(values: &[Option<Bytes>]) -> Result<Vec<T>, StorageError> {
     values.iter().flatten().map(|bytes| codec::decode(bytes, "the head of a run")).collect()
+}
+
+/// Opening writes a little; on a full disk it must do without, so that reading goes on.
+fn unless_full(error: AppError) -> Result<(), AppError> {
+    match error {
+        AppError::Storage(StorageError::Full { .. }) => Ok(()),
+        error => Err(error),
+    }
 }

@@ -6,7 +6,7 @@ use bytes::Bytes;
 use locution_engine::config::EngineConfig;
 use locution_engine::text::Quantizer;
 
-use crate::records::{SiteRecord, codec};
+use crate::records::SiteRecord;
 use crate::storage::StorageError;
 
 /// The record as it stands in storage.
@@ -19,8 +19,9 @@ pub struct SiteState {
 }
 
 impl SiteState {
-    pub(super) fn decode(bytes: Bytes) -> Result<Self, StorageError> {
-        let record: SiteRecord = codec::decode(&bytes, "the record of the site")?;
+    /// A record of the first layout is given a birth.
+    pub(super) fn decode(bytes: Bytes, birth_if_none: u64) -> Result<Self, StorageError> {
+        let record = SiteRecord::decode(&bytes, birth_if_none)?;
         let config = stored_config(&record.config_json).map_err(|error| StorageError::Corrupt {
             what: format!("the configuration of the site: {error}"),
         })?;

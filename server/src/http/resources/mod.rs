@@ -1,6 +1,7 @@
 //! One file per resource: parameters, bodies, handlers, in that order. A body's conversion is the one gate into the
 //! types of the use cases; a handler extracts, calls one use case and wraps the answer.
 
+pub(super) mod backups;
 pub(super) mod batches;
 pub(super) mod changes;
 pub(super) mod jobs;

@@ -8,6 +8,7 @@ use locution_engine::config::EngineConfig;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use crate::app::ListedSite;
 use crate::app::site::SiteInfo;
 use crate::auth::Identity;
 use crate::error::ApiError;
@@ -26,12 +27,27 @@ pub struct NewSiteDto {
     pub config: Option<serde_json::Value>,
 }
 
+/// Whether a site can be asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum SiteStateDto {
+    /// It answers.
+    Serving,
+    /// It cannot be opened; it can be deleted, and its numbers are 0.
+    Unreadable,
+}
+
 /// What a site holds.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct SiteSummaryDto {
     /// Its name.
     #[schema(example = "hospital-floor-2")]
     pub site: String,
+    /// Whether it can be asked.
+    pub state: SiteStateDto,
+    /// Why it is unreadable, and what can be done about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// Runs.
     pub num_runs: u32,
     /// Scans of all runs.
@@ -77,6 +93,8 @@ impl From<&SiteInfo> for SiteSummaryDto {
     fn from(info: &SiteInfo) -> Self {
         Self {
             site: info.name.to_string(),
+            state: SiteStateDto::Serving,
+            reason: None,
             num_runs: info.record.num_runs,
             num_scans: info.num_scans,
             num_observations: info.num_observations,
@@ -84,6 +102,35 @@ impl From<&SiteInfo> for SiteSummaryDto {
             bytes_on_disk: info.num_bytes_on_disk,
             generation: info.record.generation,
             map_version: (info.record.map_version > 0).then_some(info.record.map_version),
+        }
+    }
+}
+
+impl SiteSummaryDto {
+    /// A site of a list, whether or not it can be opened.
+    async fn of(listed: ListedSite) -> Self {
+        let info = match listed.site {
+            Ok(site) => site.info().await,
+            Err(error) => Err(error),
+        };
+        match info {
+            Ok(info) => Self::from(&info),
+            Err(error) => Self::unreadable(listed.name.to_string(), error.to_string()),
+        }
+    }
+
+    fn unreadable(site: String, reason: String) -> Self {
+        Self {
+            site,
+            state: SiteStateDto::Unreadable,
+            reason: Some(reason),
+            num_runs: 0,
+            num_scans: 0,
+            num_observations: 0,
+            num_words: 0,
+            bytes_on_disk: 0,
+            generation: 0,
+            map_version: None,
         }
     }
 }
@@ -141,12 +188,13 @@ pub async fn list_sites(
     Extension(identity): Extension<Identity>,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<SiteSummaryDto>>, ApiError> {
-    let sites = state.app.sites(|name| identity.may_see(name)).await?;
+    let sites = state.app.listed_sites(|name| identity.may_see(name)).await?;
+    let num_sites = sites.len() as u64;
     let mut items = Vec::new();
-    for site in sites.iter().skip(usize::try_from(page.first).unwrap_or(usize::MAX)).take(page.limit) {
-        items.push(SiteSummaryDto::from(&site.info().await?));
+    for listed in sites.into_iter().skip(usize::try_from(page.first).unwrap_or(usize::MAX)).take(page.limit) {
+        items.push(SiteSummaryDto::of(listed).await);
     }
-    Ok(Json(Page::of(items, page.first, sites.len() as u64)))
+    Ok(Json(Page::of(items, page.first, num_sites)))
 }
 
 /// One site.
