@@ -178,15 +178,22 @@ impl GraphLines {
         Ok(GraphDocument { graph, ids, passed_over: self.passed_over })
     }
 
-    /// Which vertex follows which along the drive. Identifiers are only names: the drive's order is theirs or that in
-    /// which the file mentions them, whichever is chained by more edges.
+    /// Which vertex follows which along the drive. Identifiers are only names: the drive's order is theirs, that in
+    /// which the file mentions them, or that in which its edges do, whichever is chained by more edges.
     fn successors(&self, ascending: &[u64]) -> BTreeMap<u64, u64> {
         let edges: BTreeSet<(u64, u64)> =
             self.edges.iter().flat_map(|edge| [(edge.i, edge.j), (edge.j, edge.i)]).collect();
         let num_chained =
             |order: &[u64]| order.windows(2).filter(|pair| edges.contains(&(pair[0], pair[1]))).count();
-        let is_mixed = num_chained(&self.mentioned) > num_chained(ascending);
-        let order = if is_mixed { &self.mentioned } else { ascending };
+        let mut joined = Vec::new();
+        let mut is_joined = BTreeSet::new();
+        joined.extend(self.edges.iter().flat_map(|edge| [edge.i, edge.j]).filter(|&id| is_joined.insert(id)));
+        let mut order = ascending;
+        for other in [self.mentioned.as_slice(), &joined] {
+            if num_chained(other) > num_chained(order) {
+                order = other;
+            }
+        }
         order.windows(2).map(|pair| (pair[0], pair[1])).collect()
     }
 }
