@@ -22,7 +22,7 @@ async fn a_full_disk_refuses_writes_and_keeps_what_it_has() {
     let mount = directory.path().join("disk");
     let (binary, scans) = (locution_binary(), drive(20_000, 9));
     let ballast = mount.join("ballast");
-    std::fs::write(&ballast, vec![1; 24 << 20]).unwrap();
+    std::fs::write(&ballast, vec![1; 20 << 20]).unwrap();
     let mut server = Process::start(&binary, &mount.join("data"));
     server.api().make_run("a", "r").await;
     let mut next = 0;

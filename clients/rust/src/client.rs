@@ -46,6 +46,7 @@ pub(crate) enum Body {
     Empty,
     Json(Vec<u8>),
     Cbor(Vec<u8>),
+    Octets(Vec<u8>),
 }
 
 impl Body {
@@ -106,6 +107,7 @@ impl Client {
             Body::Empty => (None, Vec::new()),
             Body::Json(bytes) => (Some("application/json"), bytes),
             Body::Cbor(bytes) => (Some("application/cbor"), bytes),
+            Body::Octets(bytes) => (Some("application/octet-stream"), bytes),
         };
         // Shared, so that a repetition does not copy it.
         let bytes = bytes::Bytes::from(bytes);

@@ -74,6 +74,8 @@ routes! {
     GET_SITE "get_site" GET "/v1/sites/{site}";
     MAKE_SITE "make_site" PUT "/v1/sites/{site}";
     DELETE_SITE "delete_site" DELETE "/v1/sites/{site}";
+    BACKUP_SITE "backup_site" GET "/v1/sites/{site}/backup";
+    RESTORE_SITE "restore_site" PUT "/v1/sites/{site}/backup";
     LIST_RUNS "list_runs" GET "/v1/sites/{site}/runs";
     GET_RUN "get_run" GET "/v1/sites/{site}/runs/{run}";
     MAKE_RUN "make_run" PUT "/v1/sites/{site}/runs/{run}";

@@ -49,4 +49,20 @@ impl Client {
     pub async fn delete_site(&self, site: &str) -> Result<(), ClientError> {
         self.done(&routes::DELETE_SITE, &[site], Body::Empty).await
     }
+
+    /// A site as one stream of bytes, as it stands now.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn backup_site(&self, site: &str) -> Result<Vec<u8>, ClientError> {
+        self.bytes(&routes::BACKUP_SITE, &[site], &Query::default()).await
+    }
+
+    /// Makes a site of a backup.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 409 when a site of the name stands, 422 when the backup is damaged or cut off.
+    pub async fn restore_site(&self, site: &str, backup: Vec<u8>) -> Result<SiteSummary, ClientError> {
+        self.answer(&routes::RESTORE_SITE, &[site], &Query::default(), Body::Octets(backup)).await
+    }
 }

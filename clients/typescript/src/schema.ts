@@ -142,6 +142,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/backup": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Back up a site as it stands now, while it serves.
+         * @description The stream ends with a block that says what it should hold; one that was cut off cannot be restored.
+         */
+        get: operations["backup_site"];
+        /** Make a site of a backup. */
+        put: operations["restore_site"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/builds": {
         parameters: {
             query?: never;
@@ -734,7 +755,7 @@ export interface components {
         /** @description Scans to append to a run. */
         Batch: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Sequence number of the first scan; the first scan of a run has 0.
              * @example 0
              */
@@ -747,7 +768,7 @@ export interface components {
             /** @description Whether it came or went. */
             kind: components["schemas"]["ChangeKind"];
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Component of the map in whose frame the positions are.
              */
             component: number;
@@ -793,7 +814,7 @@ export interface components {
         /** @description A part of the map with a frame of its own. */
         Component: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Its number.
              */
             component: number;
@@ -863,7 +884,7 @@ export interface components {
             /** @description The site. */
             site: string;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The map version looked in.
              */
             map_version: number;
@@ -915,7 +936,7 @@ export interface components {
         /** @description A place where an example may end. */
         ExamplePlace: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description The component of the map whose frame the pose is in.
              */
             component: number;
@@ -996,7 +1017,7 @@ export interface components {
         /** @description A place where the robot may be. */
         Hypothesis: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description The component of the map whose frame the pose is in.
              */
             component: number;
@@ -1015,12 +1036,12 @@ export interface components {
             /** @description Name of the run. */
             run: string;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description First observation, inclusive.
              */
             first: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Last observation, inclusive.
              */
             last: number;
@@ -1066,7 +1087,7 @@ export interface components {
         /** @description The pose of a keyframe in the map. */
         KeyframePose: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Sequence number of its scan.
              */
             scan_seq: number;
@@ -1091,19 +1112,19 @@ export interface components {
             /** @description The run that drove it. */
             run: string;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Component of the map.
              */
             component: number;
             /** @description What kind of place it went through. */
             label: components["schemas"]["PlaceLabel"];
             /**
-             * Format: u-int64
+             * Format: int64
              * @description First observation, inclusive.
              */
             first: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Last observation, inclusive.
              */
             last: number;
@@ -1183,14 +1204,14 @@ export interface components {
             /** @description Its name. */
             id: string;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The map version it looks in.
              */
             map_version: number;
             /** @description How sure it is. */
             state: components["schemas"]["LocalizationState"];
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The sequence number to send next.
              */
             next_sequence: number;
@@ -1210,7 +1231,7 @@ export interface components {
         /** @description A map version. */
         Map: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Its number.
              */
             version: number;
@@ -1232,12 +1253,12 @@ export interface components {
             /** @description Its name. */
             run: string;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description The component whose frame the poses are in.
              */
             component: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Scans it had when the map was built.
              */
             num_scans: number;
@@ -1252,17 +1273,17 @@ export interface components {
         /** @description Figures of a map. */
         MapStatistics: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Matches, whatever became of them.
              */
             num_matches: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Matches that hold the map together.
              */
             num_verified: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Keyframes.
              */
             num_keyframes: number;
@@ -1338,12 +1359,12 @@ export interface components {
         /** @description A density sample. */
         Observation: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Its number in the run.
              */
             observation: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Sequence number of the scan taken at this place.
              */
             scan_seq: number;
@@ -1366,7 +1387,7 @@ export interface components {
             /** @description Whether no opening of unknown cells was met. */
             is_hard: boolean;
             /**
-             * Format: u-int8
+             * Format: int32
              * @description Groups of free cells on the border of the kernel.
              */
             num_frontiers: number;
@@ -1381,7 +1402,7 @@ export interface components {
         /** @description A place: driven ground of one label, voted over all passes. */
         Place: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Its number in the component.
              */
             place: number;
@@ -1461,7 +1482,7 @@ export interface components {
              */
             title: string;
             /**
-             * Format: u-int16
+             * Format: int32
              * @description The HTTP status.
              * @example 422
              */
@@ -1474,7 +1495,7 @@ export interface components {
              */
             field?: string | null;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The sequence number that continues the run.
              */
             expected_sequence?: number | null;
@@ -1494,17 +1515,17 @@ export interface components {
         /** @description The answer to an accepted batch, also when it is repeated. */
         Receipt: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The sequence number to send next.
              */
             next_sequence: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Observations of the run after this batch.
              */
             num_observations: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Words of all levels of the run after this batch.
              */
             num_words: number;
@@ -1512,19 +1533,19 @@ export interface components {
         /** @description A stretch of driving with one density class: a word, placed in the map. */
         Region: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Component.
              */
             component: number;
             /** @description The run that drove it. */
             run: string;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Number of the word of level 0.
              */
             word: number;
             /**
-             * Format: u-int8
+             * Format: int32
              * @description Density class.
              */
             class: number;
@@ -1544,12 +1565,12 @@ export interface components {
         /** @description How one submap lies on the other. */
         Registration: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Number of the keyframe of the earlier run.
              */
             earlier_keyframe: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Number of the keyframe of the later run.
              */
             later_keyframe: number;
@@ -1585,7 +1606,7 @@ export interface components {
         /** @description One place on a route. */
         RouteStep: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Number of the place.
              */
             place: number;
@@ -1620,22 +1641,22 @@ export interface components {
             /** @description Whether it takes more scans. */
             state: components["schemas"]["RunState"];
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The sequence number to send next.
              */
             next_sequence: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Scans stored.
              */
             num_scans: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Observations so far.
              */
             num_observations: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Words of all levels so far.
              */
             num_words: number;
@@ -1675,41 +1696,46 @@ export interface components {
             /** @description The engine's configuration in it, complete. */
             config: Record<string, never>;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Runs.
              */
             num_runs: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Scans of all runs.
              */
             num_scans: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Observations of all runs.
              */
             num_observations: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Words of all levels of all runs.
              */
             num_words: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Bytes on disk.
              */
             bytes_on_disk: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description The text generation that serves.
              */
             generation: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The map version that serves; null before the first build.
              */
             map_version?: number | null;
         };
+        /**
+         * @description Whether a site can be asked.
+         * @enum {string}
+         */
+        SiteState: "serving" | "unreadable";
         /** @description What a site holds. */
         SiteSummary: {
             /**
@@ -1717,38 +1743,42 @@ export interface components {
              * @example hospital-floor-2
              */
             site: string;
+            /** @description Whether it can be asked. */
+            state: components["schemas"]["SiteState"];
+            /** @description Why it is unreadable, and what can be done about it. */
+            reason?: string | null;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Runs.
              */
             num_runs: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Scans of all runs.
              */
             num_scans: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Observations of all runs.
              */
             num_observations: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Words of all levels of all runs.
              */
             num_words: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Bytes on disk.
              */
             bytes_on_disk: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description The text generation that serves.
              */
             generation: number;
             /**
-             * Format: u-int64
+             * Format: int64
              * @description The map version that serves; null before the first build.
              */
             map_version?: number | null;
@@ -1763,7 +1793,7 @@ export interface components {
         /** @description A pose at the time of a scan. */
         StampedPose: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Sequence number of the scan.
              */
             scan_seq: number;
@@ -1791,7 +1821,7 @@ export interface components {
         /** @description A stored scan. */
         StoredScan: {
             /**
-             * Format: u-int64
+             * Format: int64
              * @description Sequence number.
              */
             scan_seq: number;
@@ -1815,7 +1845,7 @@ export interface components {
         /** @description Poses of one run. */
         Trajectory: {
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Component of the map that the poses belong to; null outside the map frame.
              */
             component?: number | null;
@@ -1832,12 +1862,12 @@ export interface components {
             /** @description Its name. */
             id: components["schemas"]["WordId"];
             /**
-             * Format: u-int8
+             * Format: int32
              * @description d: density class.
              */
             class: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description s: number of observations.
              */
             size: number;
@@ -1869,7 +1899,7 @@ export interface components {
              */
             fit: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Component of the map; null when the run is not in it.
              */
             component?: number | null;
@@ -1878,12 +1908,12 @@ export interface components {
         /** @description Names a word of a run. */
         WordId: {
             /**
-             * Format: u-int8
+             * Format: int32
              * @description 0: as observed; above: alternatives that fuse several words.
              */
             level: number;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description Position in its level.
              */
             index: number;
@@ -1898,13 +1928,13 @@ export interface components {
         /** @description One word of a question; what is left out may be anything. */
         WordPattern: {
             /**
-             * Format: u-int8
+             * Format: int32
              * @description d: density class.
              * @example 3
              */
             class?: number | null;
             /**
-             * Format: u-int32
+             * Format: int64
              * @description s: number of observations.
              * @example 24
              */
@@ -2370,6 +2400,90 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    backup_site: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The site as one stream */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": number[];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    restore_site: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/octet-stream": number[];
+            };
+        };
+        responses: {
+            /** @description The site was made */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SiteSummary"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description A site of the name stands already */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            /** @description The stream is damaged or cut off */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };

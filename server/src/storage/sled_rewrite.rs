@@ -168,9 +168,15 @@ pub(super) fn rewrite(
         }
         Ok(())
     })?;
-    salvage.content.num_commits = salvage.content.num_commits.max(num_commits_min);
-    batch.insert(CONTENT_KEY, salvage.content.encode());
     new.apply_batch(batch).map_err(sled_error)?;
+    // A damaged tree may offer a record twice; what counts is what the new one holds.
+    let num_commits = salvage.content.num_commits.max(num_commits_min);
+    salvage.content = Content { num_commits, ..Content::default() };
+    for record in &new {
+        let (key, value) = record.map_err(sled_error)?;
+        salvage.content.add(&key, &value);
+    }
+    new.insert(CONTENT_KEY, salvage.content.encode()).map_err(sled_error)?;
     new.flush().map_err(sled_error)?;
     drop((old, new));
     let io = |error: std::io::Error| unavailable(&error);

@@ -24,7 +24,7 @@ pub use matches::{
     Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,
 };
 pub use runs::{Geometry, NewRun, Receipt, Run, RunState, Scan, StoredScan};
-pub use sites::{Site, SiteSummary};
+pub use sites::{Site, SiteState, SiteSummary};
 pub use texts::{
     Frame, Observation, StampedPose, Trajectory, Word, WordAnswer, WordId, WordPattern, WordQuery,
 };

@@ -2,11 +2,26 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Whether a site can be asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SiteState {
+    /// It answers.
+    Serving,
+    /// It cannot be opened; it can be deleted, and its numbers are 0.
+    Unreadable,
+}
+
 /// What a site holds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SiteSummary {
     /// Its name.
     pub site: String,
+    /// Whether it can be asked.
+    pub state: SiteState,
+    /// Why it is unreadable, and what can be done about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
     /// Runs.
     pub num_runs: u32,
     /// Scans of all runs.
