@@ -172,7 +172,7 @@ pub(super) fn rewrite(
     // A damaged tree may offer a record twice; what counts is what the new one holds.
     let num_commits = salvage.content.num_commits.max(num_commits_min);
     salvage.content = Content { num_commits, ..Content::default() };
-    for record in &new {
+    for record in new.iter() {
         let (key, value) = record.map_err(sled_error)?;
         salvage.content.add(&key, &value);
     }
