@@ -1,4 +1,5 @@
 //! The binary `locution`: `locution serve` and its companions, one file each.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
 
 use std::process::ExitCode;
 
