@@ -275,8 +275,12 @@ async fn files_copied_while_commits_go_on_open_with_all_that_was_acknowledged() 
         batch.put(number.to_be_bytes().to_vec(), vec![number as u8; 30_000]);
         site.commit(batch, vec![]).await.unwrap();
         if number % 8 == 7 {
-            let copied = tempfile::tempdir().unwrap();
-            copy(directory.path(), copied.path());
+            // A snapshot of the database may be replaced while it is copied; then the copy is made again.
+            let whole_copy = |_| {
+                let copied = tempfile::tempdir().unwrap();
+                super::files::copy_tree(directory.path(), copied.path()).ok().map(|()| copied)
+            };
+            let copied = (0..20).find_map(whole_copy).unwrap();
             let killed = storage_in(copied.path());
             let reopened = killed.open("s").await.unwrap();
             assert_eq!(reopened.scan(b"", b"", 99).await.unwrap().len(), number as usize + 1);

@@ -105,8 +105,10 @@ fn problems_of(salvage: &Salvage, num_acknowledged: u64) -> Vec<String> {
     {
         problems.push(format!("{} of {} records can be read", content.num_pairs, recorded.num_pairs));
     }
-    if content.num_commits < num_acknowledged {
-        let missing = num_acknowledged - content.num_commits;
+    // What was read says how far it goes; a site that was written anew counts on from what was acknowledged.
+    let num_read = salvage.recorded.as_ref().map_or(0, |recorded| recorded.num_commits);
+    if num_read < num_acknowledged {
+        let missing = num_acknowledged - num_read;
         problems.push(format!("the last {missing} of {num_acknowledged} acknowledged commits are not there"));
     }
     problems
