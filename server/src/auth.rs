@@ -107,7 +107,9 @@ fn needed_scope(method: &Method, segments: &[&str]) -> Scope {
     if segments.len() == 4 && segments[3] == "backup" {
         return Scope::Admin;
     }
-    let is_question = segments.iter().any(|segment| ["queries", "localisations"].contains(segment));
+    // By its place in the path: a site or a run may be called `queries`.
+    let is_question =
+        matches!(segments, ["v1", "queries", ..] | ["v1", "sites", _, "queries" | "localisations", ..]);
     if method == Method::GET || method == Method::HEAD || is_question {
         return Scope::Read;
     }
@@ -146,5 +148,19 @@ mod tests {
         assert_eq!(needed(Method::PUT, "v1/sites/a/backup"), Scope::Admin);
         assert_eq!(needed(Method::PUT, "v1/sites/a/runs/r"), Scope::Write);
         assert_eq!(needed(Method::POST, "v1/sites/a/runs/r/batches"), Scope::Write);
+    }
+
+    #[test]
+    fn names_of_sites_and_runs_give_no_rights() {
+        let needed = |method: Method, path: &str| needed_scope(&method, &path.split('/').collect::<Vec<_>>());
+        for name in ["queries", "localisations"] {
+            assert_eq!(needed(Method::PUT, &format!("v1/sites/{name}")), Scope::Admin);
+            assert_eq!(needed(Method::DELETE, &format!("v1/sites/{name}")), Scope::Admin);
+            assert_eq!(needed(Method::PUT, &format!("v1/sites/a/runs/{name}")), Scope::Write);
+            assert_eq!(needed(Method::POST, &format!("v1/sites/{name}/runs/{name}/batches")), Scope::Write);
+            assert_eq!(needed(Method::POST, &format!("v1/sites/a/runs/{name}/finish")), Scope::Write);
+        }
+        assert_eq!(needed(Method::POST, "v1/queries/words"), Scope::Read);
+        assert_eq!(needed(Method::POST, "v1/sites/a/localisations/7/batches"), Scope::Read);
     }
 }
