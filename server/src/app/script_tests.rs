@@ -208,9 +208,9 @@ impl Stage {
     async fn words(&self, run: &str, level: u8) -> Result<String, AppError> {
         let words = self.site().await?.run(&name(run)).await?.words(level, 0, usize::MAX).await?;
         let line = |word: &locution_engine::text::Word| {
-            let turn_deg = f64::from(word.turn_rad).to_degrees();
+            let turn_deg = whole(f64::from(word.turn_rad).to_degrees());
             let (first, last) = word.observations;
-            format!("{} {} {turn_deg:.0}°  {first}–{last}\n", word.class, word.size)
+            format!("{} {} {turn_deg}°  {first}–{last}\n", word.class, word.size)
         };
         Ok(words.iter().map(line).collect())
     }
@@ -225,7 +225,9 @@ impl Stage {
         let found = trajectory(&site, &site.run(&name(run)).await?, frame, None).await?;
         let line = |seq: &&str| {
             let pose = found.poses[seq.parse::<usize>().unwrap()].frame_from_robot;
-            format!("{:.1} {:.1} {:.0}°\n", pose.x + 0.0, pose.y + 0.0, pose.theta.to_degrees() + 0.0)
+            let decimeters = |meters: f64| f64::from(whole(meters * 10.0)) / 10.0;
+            let heading_deg = whole(pose.theta.to_degrees());
+            format!("{:.1} {:.1} {heading_deg}°\n", decimeters(pose.x), decimeters(pose.y))
         };
         Ok(seqs.iter().map(line).collect())
     }
@@ -248,7 +250,7 @@ impl Stage {
             let way = if answer.direction == Direction::Same { "forwards" } else { "backwards" };
             let ((first, last), fit) = (answer.words, answer.fit);
             let place = answer.in_map.map_or(String::new(), |(component, pose)| {
-                format!(" at {:.0},{:.0} of component {component}", pose.x + 0.0, pose.y + 0.0)
+                format!(" at {},{} of component {component}", whole(pose.x), whole(pose.y))
             });
             format!("{} words {first}–{last} {way}, fit {fit:.2}{place}\n", answer.run)
         });
@@ -323,6 +325,11 @@ impl Stage {
         }
         Ok(String::new())
     }
+}
+
+/// The nearest whole number, which has no minus zero.
+fn whole(value: f64) -> i32 {
+    value.round() as i32
 }
 
 fn told(run: &Run) -> String {
