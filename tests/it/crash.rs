@@ -50,6 +50,19 @@ impl Process {
         self.child.id()
     }
 
+    /// SIGTERM, as whoever looks after services sends it; how it ended, and after how long.
+    pub(crate) async fn terminate(&mut self) -> (std::process::ExitStatus, Duration) {
+        let asked = std::time::Instant::now();
+        let told = Command::new("kill").args(["-TERM", &self.id().to_string()]).status().unwrap();
+        assert!(told.success());
+        loop {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return (status, asked.elapsed());
+            }
+            tokio::time::sleep(Duration::from_millis(20)).await;
+        }
+    }
+
     /// SIGKILL: no destructor, no flush, no goodbye.
     pub(crate) fn kill(&mut self) {
         self.child.kill().unwrap();
