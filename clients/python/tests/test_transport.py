@@ -80,7 +80,7 @@ def test_a_server_that_is_not_there_is_told() -> None:
 def test_lists_are_read_page_after_page() -> None:
     def answer(request: httpx.Request) -> httpx.Response:
         cursor = int(request.url.params.get("cursor", "0"))
-        site = {"site": f"s{cursor}", "state": "ready", "num_runs": 0, "num_scans": 0, "num_observations": 0}
+        site = {"site": f"s{cursor}", "state": "serving", "num_runs": 0, "num_scans": 0, "num_observations": 0}
         site |= {"num_words": 0, "bytes_on_disk": 0, "generation": 0}
         return httpx.Response(200, json={"items": [site], "next_cursor": str(cursor + 1) if cursor < 2 else None})
 
