@@ -45,6 +45,8 @@ pub struct ExampleAnswer {
     pub travel_m: f64,
     /// Places where it may end, likeliest first.
     pub places: Vec<Hypothesis>,
+    /// Probability that it was not made in this site.
+    pub probability_elsewhere: f64,
 }
 
 #[derive(Serialize)]
@@ -64,6 +66,10 @@ pub struct Localization {
     pub state: LocalizationState,
     /// Places where the robot may be, likeliest first.
     pub hypotheses: Vec<Hypothesis>,
+    /// Probability that it is not in the map; with those of all places 1.
+    pub probability_elsewhere: f64,
+    /// What is missing to be found, by the names of the API; empty when it is.
+    pub missing: Vec<String>,
     /// Sequence number that the next scan must have.
     pub next_sequence: u64,
 }

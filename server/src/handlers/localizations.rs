@@ -7,7 +7,9 @@ use axum::{Extension, Json};
 use crate::app::AppError;
 use crate::auth::Identity;
 use crate::dto::batches::BatchDto;
-use crate::dto::localizations::{ExampleAnswerDto, ExampleQueryDto, LocalizationDto, NewLocalizationDto};
+use crate::dto::localizations::{
+    ExampleAnswerDto, ExampleQueryDto, LocalizationDto, NewLocalizationDto, PosePriorDto,
+};
 use crate::error::{ApiError, Problem};
 use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
 use crate::state::AppState;
@@ -23,7 +25,8 @@ pub async fn open_localization(
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<(StatusCode, Json<LocalizationDto>), ApiError> {
     let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.open_localization(&site, geometry).await?;
+    let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
+    let info = state.app.open_localization(&site, geometry, prior).await?;
     Ok((StatusCode::CREATED, Json(info.into())))
 }
 
