@@ -29,6 +29,8 @@ enum What {
     Localization(localization::LocalizationArguments),
     /// Short recordings that are not stored: found in the map, or honestly not here.
     Query(query::QueryArguments),
+    /// Robots on maps of their own building, of a part of it, and of others, without a server: ever wrongly sure, found.
+    OpenWorld(locution_lab::open_world::OpenWorldArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
     Thesis(locution_lab::thesis::ThesisArguments),
 }
@@ -46,6 +48,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Labels(arguments) => labels::run(arguments).await,
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
+            What::OpenWorld(arguments) => locution_lab::open_world::run(arguments),
             What::Thesis(arguments) => locution_lab::thesis::run(arguments),
         }
     })
