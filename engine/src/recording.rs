@@ -9,9 +9,15 @@
 //! served          K0 ───────o──────o───────── K1          a third and two thirds of the way from + to K1
 //! ```
 //!
-//! So the way has no step at a keyframe, whatever the graph did to it.
+//! So the way has no step at a keyframe, whatever the graph did to it. Where so much is left over that the own motion
+//! cannot have been right, as when odometry steps aside or stands still, the way between two keyframes is straight.
 
 use crate::geometry::{Pose2, wrap_angle};
+
+/// More than this left over between two keyframes is no error of the map or of honest odometry, metres…
+const LEFT_OVER_MAX_M: f64 = 0.15;
+/// … and radians.
+const LEFT_OVER_MAX_RAD: f64 = 0.15;
 
 /// A keyframe in a run's own frame and in the map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,12 +56,22 @@ impl RunTrajectory {
         let carried_after = carry(before, &after.run_from_robot);
         let share = (scan_seq - before.scan_seq) as f64 / (after.scan_seq - before.scan_seq) as f64;
         let left_rad = wrap_angle(after.map_from_robot.theta - carried_after.theta);
+        let left_m = after.map_from_robot.distance(&carried_after);
+        if left_m > LEFT_OVER_MAX_M || left_rad.abs() > LEFT_OVER_MAX_RAD {
+            return Some(straight_between(&before.map_from_robot, &after.map_from_robot, share));
+        }
         Some(Pose2::new(
             carried.x + share * (after.map_from_robot.x - carried_after.x),
             carried.y + share * (after.map_from_robot.y - carried_after.y),
             carried.theta + share * left_rad,
         ))
     }
+}
+
+/// A share of the straight way from one pose to another.
+fn straight_between(from: &Pose2, to: &Pose2, share: f64) -> Pose2 {
+    let turn = wrap_angle(to.theta - from.theta);
+    Pose2::new(from.x + share * (to.x - from.x), from.y + share * (to.y - from.y), from.theta + share * turn)
 }
 
 /// The keyframe's pose in the map moved on by the run's own motion.
@@ -94,6 +110,19 @@ mod tests {
         assert_eq!(poses[2], Pose2::new(1.0, 0.5, 0.0));
         assert_eq!(poses[3], placed[1].1);
         assert_eq!(poses[5], Pose2::new(4.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn a_jump_of_the_own_motion_between_two_keyframes_is_not_carried() {
+        let odometry = [0.0, 0.05, 2.1, 2.15, 2.2];
+        let at = |seq: u64| Pose2::new(odometry[seq as usize], 0.0, 0.0);
+        let run: RunTrajectory = [(0, 0.0), (4, 0.2)]
+            .into_iter()
+            .map(|(seq, x)| keyframe(seq, at(seq), Pose2::new(x, 0.0, 0.0)))
+            .collect();
+        for seq in 0..5 {
+            assert!((run.at(seq, &at(seq)).unwrap().x - 0.05 * seq as f64).abs() < 1e-9);
+        }
     }
 
     fn any_pose() -> impl Strategy<Value = Pose2> {

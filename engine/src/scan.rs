@@ -36,7 +36,17 @@ impl ScanGeometry {
         ranges_m: &'a [f32],
         limit_m: f64,
     ) -> impl Iterator<Item = (usize, Point2)> + 'a {
-        ranges_m.iter().enumerate().filter_map(move |(beam_idx, &range_m)| {
+        self.endpoints_of_every(1, ranges_m, limit_m)
+    }
+
+    /// The same of one beam in every `stride`.
+    pub fn endpoints_of_every<'a>(
+        &'a self,
+        stride: usize,
+        ranges_m: &'a [f32],
+        limit_m: f64,
+    ) -> impl Iterator<Item = (usize, Point2)> + 'a {
+        ranges_m.iter().enumerate().step_by(stride).filter_map(move |(beam_idx, &range_m)| {
             let range = f64::from(range_m);
             if !self.is_return(range_m) || range > limit_m {
                 return None;

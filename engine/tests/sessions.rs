@@ -6,7 +6,7 @@ use std::sync::Arc;
 use locution_engine::geometry::{Point2, Pose2, angle_between};
 use locution_engine::locate::{
     LikelihoodFieldConfig, LocalizationEstimate, LocalizationState, Missing, PosePrior, ServedMap,
-    SessionMap, SiteSession,
+    SessionConfig, SessionMap, SiteSession,
 };
 use locution_engine::occupancy::{CellState, GridMap, cast_ray};
 use locution_engine::recall::{PlaceIndexBuilder, RecallConfig};

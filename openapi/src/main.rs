@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 
 fn main() -> anyhow::Result<()> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("openapi.json");
-    let current = serde_json::to_string_pretty(&locution_server::openapi::document())? + "\n";
+    let current = locution_server::document_json();
     if std::env::args().any(|argument| argument == "--check") {
         let checked_in = std::fs::read_to_string(&path).context("openapi.json has not been written")?;
         if checked_in != current {

@@ -20,7 +20,7 @@ pub struct Problem {
     #[schema(example = "https://locution.dev/problems/invalid-scan")]
     pub kind: String,
     /// The kind in words.
-    #[schema(example = "A scan cannot be")]
+    #[schema(example = "Invalid scan")]
     pub title: String,
     /// The HTTP status.
     #[schema(example = 422)]
@@ -76,28 +76,28 @@ impl ApiError {
 
     /// 400: the body cannot be read.
     pub fn malformed(detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, "malformed-body", "The body cannot be read", detail)
+        Self::new(StatusCode::BAD_REQUEST, "malformed-body", "Malformed body", detail)
     }
 
     /// 422: a well-formed value that cannot be.
     pub fn invalid(field: impl Into<String>, detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-value", "A value cannot be", detail).at(field)
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-value", "Invalid value", detail).at(field)
     }
 
     /// 422: a value of a scan that cannot be.
     pub fn invalid_scan(field: impl Into<String>, detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-scan", "A scan cannot be", detail).at(field)
+        Self::new(StatusCode::UNPROCESSABLE_ENTITY, "invalid-scan", "Invalid scan", detail).at(field)
     }
 
     /// 404: no such thing.
     pub fn not_found(detail: impl Into<String>) -> Self {
-        Self::new(StatusCode::NOT_FOUND, "not-found", "There is no such thing", detail)
+        Self::new(StatusCode::NOT_FOUND, "not-found", "Not found", detail)
     }
 
     /// 503: too much at once.
     pub fn overloaded() -> Self {
         let detail = "more requests are being served than the server allows at once";
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, "overloaded", "The server is busy", detail).retry_after(1)
+        Self::new(StatusCode::SERVICE_UNAVAILABLE, "overloaded", "Service unavailable", detail).retry_after(1)
     }
 
     /// A problem for a status that was answered without one, such as by a middleware.
@@ -113,25 +113,21 @@ impl From<AppError> for ApiError {
         let detail = error.to_string();
         match error {
             AppError::NotFound { .. } => Self::not_found(detail),
-            AppError::Exists { .. } => {
-                Self::new(StatusCode::CONFLICT, "exists", "It exists and is different", detail)
-            }
+            AppError::Exists { .. } => Self::new(StatusCode::CONFLICT, "exists", "Already exists", detail),
             AppError::Sequence { expected_sequence, .. } => {
-                Self::new(StatusCode::CONFLICT, "sequence", "The batch does not continue the run", detail)
+                Self::new(StatusCode::CONFLICT, "sequence", "Sequence conflict", detail)
                     .at("first_sequence")
                     .expecting(expected_sequence)
             }
             AppError::Finished { expected_sequence, .. } => {
-                Self::new(StatusCode::CONFLICT, "finished", "The run is finished", detail)
+                Self::new(StatusCode::CONFLICT, "finished", "Run finished", detail)
                     .expecting(expected_sequence)
             }
             AppError::Invalid { field, is_scan: true, .. } => Self::invalid_scan(field, detail),
             AppError::Invalid { field, .. } => Self::invalid(field, detail),
-            AppError::NotReady { .. } => {
-                Self::new(StatusCode::CONFLICT, "not-ready", "Something must be made first", detail)
-            }
+            AppError::NotReady { .. } => Self::new(StatusCode::CONFLICT, "not-ready", "Not ready", detail),
             AppError::Busy { retry_after, .. } => {
-                Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "A queue is full", detail)
+                Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
                     .retry_after(retry_after.as_secs().max(1))
             }
             AppError::Storage(error) => Self::from(error),
@@ -140,7 +136,7 @@ impl From<AppError> for ApiError {
                 Self::new(
                     StatusCode::INTERNAL_SERVER_ERROR,
                     "internal",
-                    "A bug of ours",
+                    "Internal server error",
                     "see the server's log",
                 )
             }
@@ -152,20 +148,15 @@ impl From<StorageError> for ApiError {
     fn from(error: StorageError) -> Self {
         let detail = error.to_string();
         let unavailable = |seconds| {
-            Self::new(
-                StatusCode::SERVICE_UNAVAILABLE,
-                "storage",
-                "The storage cannot serve now",
-                detail.clone(),
-            )
-            .retry_after(seconds)
+            Self::new(StatusCode::SERVICE_UNAVAILABLE, "storage", "Storage unavailable", detail.clone())
+                .retry_after(seconds)
         };
         match error {
             StorageError::Conflict | StorageError::Fenced => unavailable(1),
             StorageError::Unavailable { retry_after, .. } => unavailable(retry_after.as_secs().max(1)),
             StorageError::Corrupt { .. } | StorageError::ValueTooLarge { .. } => {
                 tracing::error!(error = detail, "the storage failed");
-                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Stored data cannot be read", detail)
+                Self::new(StatusCode::INTERNAL_SERVER_ERROR, "corrupt", "Corrupt data", detail)
             }
         }
     }

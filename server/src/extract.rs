@@ -7,13 +7,16 @@ use axum::body::Bytes;
 use axum::extract::rejection::BytesRejection;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, StatusCode, header};
+use axum::http::{HeaderMap, StatusCode, Uri, header};
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use tokio::sync::OwnedSemaphorePermit;
 
 use crate::app::site::Site;
 use crate::app::{AppError, Name};
 use crate::error::ApiError;
+use crate::http::values::{PageBounds, PageParams};
+use crate::http::wording::{located, of_cbor, plain};
 use crate::state::AppState;
 
 /// Bodies above this are parsed on a blocking thread.
@@ -53,7 +56,7 @@ impl Format {
                 let detail =
                     format!("`{other}` is not understood; send application/json or application/cbor");
                 let status = StatusCode::UNSUPPORTED_MEDIA_TYPE;
-                Err(ApiError::new(status, "media-type", "The body's type is not understood", detail))
+                Err(ApiError::new(status, "media-type", "Unsupported media type", detail))
             }
         }
     }
@@ -85,10 +88,16 @@ fn parse_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
     match ciborium::from_reader::<Located<T>, _>(bytes) {
         Ok(Located(value)) => Ok(value),
         Err(ciborium::de::Error::Semantic(_, message)) => match message.split_once(LOCATION_END) {
-            Some((path, problem)) => Err(malformed(path.to_owned(), &problem)),
-            None => Err(ApiError::malformed(message)),
+            Some((path, problem)) => Err(malformed(path.to_owned(), &of_cbor(problem))),
+            None => Err(ApiError::malformed(plain(&message))),
         },
-        Err(error) => Err(ApiError::malformed(error.to_string())),
+        Err(ciborium::de::Error::Io(_)) => Err(ApiError::malformed("the body ends before its CBOR does")),
+        Err(ciborium::de::Error::Syntax(offset)) => {
+            Err(ApiError::malformed(format!("the body is not CBOR from byte {offset} on")))
+        }
+        Err(ciborium::de::Error::RecursionLimitExceeded) => {
+            Err(ApiError::malformed("the body is nested too deep"))
+        }
     }
 }
 
@@ -108,16 +117,17 @@ impl<'de, T: serde::Deserialize<'de>> serde::Deserialize<'de> for Located<T> {
 }
 
 fn malformed(path: String, error: &dyn std::fmt::Display) -> ApiError {
+    let problem = plain(&error.to_string());
     if path == "." || path.is_empty() {
-        return ApiError::malformed(error.to_string());
+        return ApiError::malformed(problem);
     }
-    ApiError::malformed(format!("{path}: {error}")).at(path)
+    ApiError::malformed(format!("{path}: {problem}")).at(path)
 }
 
 fn unreadable(rejection: BytesRejection) -> ApiError {
     if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
         let detail = "the body is larger than the server's limits.body_bytes_max";
-        return ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "The body is too large", detail);
+        return ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Body too large", detail);
     }
     ApiError::malformed(rejection.body_text())
 }
@@ -199,12 +209,46 @@ impl<T: DeserializeOwned> FromRequestParts<AppState> for Params<T> {
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
         let query = Query::<T>::from_request_parts(parts, state).await;
-        query.map(|Query(params)| Self(params)).map_err(|rejection| {
-            let title = "The query cannot be read";
-            ApiError::new(StatusCode::BAD_REQUEST, "malformed-query", title, rejection.body_text())
-        })
+        query.map(|Query(params)| Self(params)).map_err(|rejection| malformed_query(rejection.body_text()))
     }
 }
+
+/// The query parameters of a paged list: its own, and which page.
+pub struct Paged<T>(pub T, pub PageBounds);
+
+impl<T: DeserializeOwned> FromRequestParts<AppState> for Paged<T> {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, _: &AppState) -> Result<Self, ApiError> {
+        let query = parts.uri.query().unwrap_or_default();
+        let (page, own): (Vec<&str>, Vec<&str>) = query
+            .split('&')
+            .partition(|pair| ["limit", "cursor"].contains(&pair.split('=').next().unwrap_or_default()));
+        let page: PageParams = parse_query(&page.join("&"))?;
+        Ok(Self(parse_query(&own.join("&"))?, page.check()?))
+    }
+}
+
+fn parse_query<T: DeserializeOwned>(query: &str) -> Result<T, ApiError> {
+    let uri = Uri::builder().path_and_query(format!("/?{query}")).build();
+    let uri = uri.map_err(|error| malformed_query(error.to_string()))?;
+    let Query(params) = Query::try_from_uri(&uri).map_err(|error| malformed_query(error.body_text()))?;
+    Ok(params)
+}
+
+fn malformed_query(message: String) -> ApiError {
+    let detail = plain(&message);
+    let error = ApiError::new(StatusCode::BAD_REQUEST, "malformed-query", "Malformed query", &*detail);
+    match located(&detail) {
+        (Some(field), _) => error.at(field),
+        (None, _) => error,
+    }
+}
+
+/// The query of a list that has no parameters of its own.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NoParams {}
 
 /// Whether the client asks for plain text rather than JSON.
 pub struct WantsText(pub bool);

@@ -1,7 +1,7 @@
 //! The Locution server: HTTP in front of the engine, with storage underneath.
 //!
 //! ```text
-//! router ─► handlers ─► dto (checks) ─► app (use cases) ─► engine (pure) and storage (ordered bytes)
+//! http (routes, checks) ─► app (use cases) ─► engine (pure) and storage (ordered bytes)
 //! ```
 //!
 //! [`start_server`] puts the parts together; the command line and every test call it.
@@ -20,16 +20,16 @@ use tokio::task::JoinHandle;
 mod app;
 mod auth;
 pub mod config;
-mod dto;
 mod error;
 mod extract;
-mod handlers;
-pub mod openapi;
+mod http;
 mod picture;
 mod records;
 mod router;
 mod state;
 mod storage;
+
+pub use http::openapi::document_json;
 
 use app::App;
 use config::{ServerConfig, ServerConfigError};

@@ -1,79 +1,26 @@
-//! The whole API on one screen, and the layers around it.
+//! The service: routes, documentation, and the layers around them.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use axum::Router;
 use axum::extract::{DefaultBodyLimit, MatchedPath, Request, State};
 use axum::http::{HeaderValue, StatusCode, header};
-use axum::middleware::{self, Next};
+use axum::middleware::Next;
 use axum::response::{IntoResponse, Redirect, Response};
 use axum::routing::get;
+use axum::{Router, middleware};
 use tokio::sync::Semaphore;
 use tower_http::catch_panic::CatchPanicLayer;
 use tower_http::compression::CompressionLayer;
 use tower_http::decompression::RequestDecompressionLayer;
 use tower_http::timeout::TimeoutLayer;
-use utoipa::OpenApi;
-use utoipa_axum::router::OpenApiRouter;
-use utoipa_axum::routes;
 use utoipa_swagger_ui::SwaggerUi;
 
 use crate::auth;
 use crate::error::ApiError;
-use crate::handlers::{
-    batches, changes, jobs, labels, localizations, maps, matches, operations, places, queries, runs, sites,
-    texts,
-};
-use crate::openapi::{self, Document};
+use crate::http::routes::routes;
+use crate::http::{nanoseconds, openapi, with_version};
 use crate::state::AppState;
-
-/// Every route, with its documentation.
-pub(crate) fn routes() -> OpenApiRouter<AppState> {
-    OpenApiRouter::with_openapi(Document::openapi())
-        .routes(routes!(operations::healthz))
-        .routes(routes!(operations::readyz))
-        .routes(routes!(operations::metrics))
-        .routes(routes!(operations::ui))
-        .routes(routes!(sites::list_sites))
-        .routes(routes!(sites::make_site, sites::get_site, sites::delete_site))
-        .routes(routes!(runs::list_runs))
-        .routes(routes!(runs::make_run, runs::get_run))
-        .routes(routes!(runs::finish_run))
-        .routes(routes!(batches::append_batch))
-        .routes(routes!(batches::list_scans))
-        .routes(routes!(texts::list_observations))
-        .routes(routes!(texts::list_words))
-        .routes(routes!(texts::get_trajectory))
-        .routes(routes!(texts::get_trajectory_tum))
-        .routes(routes!(jobs::build_map))
-        .routes(routes!(jobs::list_jobs))
-        .routes(routes!(jobs::get_job))
-        .routes(routes!(matches::list_matches))
-        .routes(routes!(matches::get_match))
-        .routes(routes!(matches::decide_match, matches::undecide_match))
-        .routes(routes!(maps::get_map))
-        .routes(routes!(maps::get_grid))
-        .routes(routes!(maps::get_grid_pgm))
-        .routes(routes!(maps::get_grid_png))
-        .routes(routes!(maps::get_grid_yaml))
-        .routes(routes!(maps::get_graph_g2o))
-        .routes(routes!(maps::get_map_tum))
-        .routes(routes!(maps::get_picture_png))
-        .routes(routes!(maps::get_picture_svg))
-        .routes(routes!(localizations::open_localization))
-        .routes(routes!(localizations::get_localization, localizations::close_localization))
-        .routes(routes!(localizations::localize))
-        .routes(routes!(localizations::query_example))
-        .routes(routes!(queries::query_words))
-        .routes(routes!(queries::query_words_everywhere))
-        .routes(routes!(labels::list_labels))
-        .routes(routes!(labels::query_labels))
-        .routes(routes!(places::list_places))
-        .routes(routes!(places::get_route))
-        .routes(routes!(changes::list_changes))
-        .routes(routes!(localizations::query_example_everywhere))
-}
 
 /// The service: routes, documentation, limits, keys.
 pub fn build_router(state: AppState) -> Router {
@@ -86,10 +33,12 @@ pub fn build_router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), guard))
         .with_state(state)
         .route("/", get(async || Redirect::temporary("/ui")))
-        .merge(SwaggerUi::new("/docs").url("/openapi.json", openapi::document()))
+        .route("/openapi.json", get(document))
+        .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
         .fallback(async || ApiError::not_found("there is no such path; see /docs"))
         .layer(DefaultBodyLimit::max(limits.body_bytes_max))
         .layer(RequestDecompressionLayer::new())
+        .layer(middleware::from_fn(nanoseconds::as_asked))
         .layer(CompressionLayer::new())
         .layer(CatchPanicLayer::custom(|_| {
             ApiError::of_status(StatusCode::INTERNAL_SERVER_ERROR).into_response()
@@ -99,7 +48,13 @@ pub fn build_router(state: AppState) -> Router {
             Duration::from_secs(limits.request_timeout_s),
         ))
         .layer(middleware::from_fn(problems_only))
+        .layer(middleware::map_response(with_version))
         .layer(middleware::from_fn_with_state(slots, bound))
+}
+
+/// The document of this API.
+async fn document() -> Response {
+    ([(header::CONTENT_TYPE, "application/json")], openapi::document_json()).into_response()
 }
 
 /// Asks for a key where one is needed.

@@ -9,4 +9,5 @@ mod crash;
 mod documentation;
 mod maps;
 mod sites;
+mod wire;
 mod words;

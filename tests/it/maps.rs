@@ -47,8 +47,10 @@ async fn a_map_is_served_in_every_form_under_its_version() {
     assert_eq!(body["components"], json!([{"component": 0, "runs": ["r"]}]));
     assert!(body["runs"][0]["poses"].as_array().unwrap().len() > 50);
     assert!(!body["regions"].as_array().unwrap().is_empty());
-    assert_eq!(map.headers["etag"], "\"1\"");
-    let known = [("if-none-match", "\"1\"")];
+    let tag = map.headers["etag"].to_str().unwrap().to_owned();
+    assert!(tag.starts_with("\"1-"), "{tag}");
+    let listed = format!("\"0\", W/{tag}");
+    let known = [("if-none-match", listed.as_str())];
     let again = api.send(reqwest::Method::GET, "/v1/sites/a/map", &known, vec![]).await.unwrap();
     assert_eq!(again.status, 304);
     let forms: [(&str, &[u8]); 7] = [
@@ -64,7 +66,7 @@ async fn a_map_is_served_in_every_form_under_its_version() {
         let answer = api.get(&format!("/v1/sites/a/map/{form}")).await;
         assert_eq!(answer.status, 200, "{form}: {}", answer.text());
         assert!(answer.bytes.starts_with(beginning), "{form}");
-        assert_eq!(answer.headers["etag"], "\"1\"");
+        assert_eq!(answer.headers["etag"], tag);
     }
     let grid = api.get("/v1/sites/a/map/grid").await.ok();
     let num_cells = grid["info"]["width"].as_u64().unwrap() * grid["info"]["height"].as_u64().unwrap();
@@ -195,8 +197,7 @@ async fn labels_are_listed_and_asked_for() {
     let question = json!({"labels": [{"label": labels[0]["label"]}]});
     let answers = api.post("/v1/sites/a/queries/labels", &question).await.ok();
     assert!(!answers.as_array().unwrap().is_empty());
-    let places = api.get("/v1/sites/a/places").await.ok();
-    assert!(!places.as_array().unwrap().is_empty());
+    assert!(!api.all("/v1/sites/a/places").await.is_empty());
     let map = api.get("/v1/sites/a/map").await.ok();
     let poses = map["runs"][0]["poses"].as_array().unwrap();
     let (from, to) = (&poses[0], &poses[poses.len() / 3]);

@@ -3,21 +3,21 @@
 //! Each robot begins at a place of its own that nobody tells the server. What the server makes of their recordings
 //! is judged against the simulator's truth, and the merged map is left to be looked at.
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Args;
 use futures::future::try_join_all;
-use indicatif::MultiProgress;
-use locution_client::Client;
+use locution_client::{Client, Frame, MatchFilter, MatchState};
 use locution_engine::formats::{CarmenLog, parse_map_server_yaml};
 use locution_engine::geometry::{Point2, Pose2};
 use locution_lab::evaluation::{JudgedMatch, TrajectoryError, judge_recognition, judge_trajectory};
 use locution_lab::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 
 use super::eval::recognition::{judged_match, judged_run};
-use super::upload::{UploadOptions, build_with_progress, progress_bar, upload_recording};
+use super::upload::{UploadOptions, build_with_progress, open_run, progress_bar, upload_recording};
 use locution_lab::recordings::Recording;
 use locution_lab::report::table;
 use locution_lab::worlds::decode_picture;
@@ -109,6 +109,9 @@ pub struct DemoArguments {
     /// Directory for the server's data and the map; what an earlier demo left in it is replaced.
     #[arg(long, default_value = "demo-out")]
     directory: PathBuf,
+    /// Where to listen [default: 127.0.0.1:7070, or a free port when that is taken].
+    #[arg(long)]
+    address: Option<SocketAddr>,
 }
 
 /// Drives the robots, prints what was recognised and serves the map.
@@ -123,7 +126,7 @@ pub fn run(arguments: &DemoArguments) -> Result<()> {
 async fn demo(arguments: &DemoArguments) -> Result<()> {
     let began = Instant::now();
     let directory = &arguments.directory;
-    let server = serve(&directory.join("data")).await?;
+    let server = serve(&directory.join("data"), arguments.address).await?;
     let client = Client::new(&server.url())?;
     println!(
         "Locution serves on {}. Three robots are about to drive through an office floor of 60 × 35 m.\n",
@@ -148,8 +151,8 @@ async fn demo(arguments: &DemoArguments) -> Result<()> {
     Ok(server.shutdown().await?)
 }
 
-/// The server on its usual port, or on a free one when that is taken.
-async fn serve(data_directory: &Path) -> Result<RunningServer> {
+/// The server where it was told to listen; else on its usual port, or on a free one when that is taken.
+async fn serve(data_directory: &Path, address: Option<SocketAddr>) -> Result<RunningServer> {
     if data_directory.exists() {
         let problem = || format!("cannot replace {}", data_directory.display());
         std::fs::remove_dir_all(data_directory).with_context(problem)?;
@@ -157,8 +160,11 @@ async fn serve(data_directory: &Path) -> Result<RunningServer> {
     let mut config = ServerConfig { data_directory: data_directory.to_owned(), ..ServerConfig::default() };
     // The demo asks for its one map itself, when all robots are back.
     config.builds.is_automatic = false;
+    if let Some(address) = address {
+        config.address = address;
+    }
     match start_server(config.clone()).await {
-        Err(StartError::Listen { .. }) => {
+        Err(StartError::Listen { .. }) if address.is_none() => {
             config.address.set_port(0);
             Ok(start_server(config).await?)
         }
@@ -192,16 +198,17 @@ fn recording(name: &str, run: &SimulatedRun) -> Recording {
 /// All robots at once, each posting its own scans.
 async fn send(client: &Client, recordings: &[Recording]) -> Result<()> {
     client.put_site(SITE, None).await?;
-    let (bars, options) = (MultiProgress::new(), UploadOptions::default());
-    let uploads = recordings.iter().map(|recording| {
-        let bar = progress_bar(&bars, &recording.name, recording.log.scans.len());
-        let options = &options;
-        async move {
-            let names = (SITE, recording.name.as_str(), recording.name.as_str());
-            upload_recording(client, names, &recording.log, options, &bar).await
-        }
+    let options = UploadOptions::default();
+    let mut opened = Vec::new();
+    for Recording { name, log } in recordings {
+        opened.push(open_run(client, (SITE, name.as_str(), name.as_str()), log, &options).await?);
+    }
+    let bar = progress_bar(SITE, recordings.iter().map(|recording| recording.log.scans.len()).sum());
+    let uploads = recordings.iter().zip(opened).map(|(Recording { name, log }, upload)| {
+        upload_recording(client, (SITE, name), upload, log, &options, &bar)
     });
     let uploads = try_join_all(uploads).await?;
+    bar.finish_and_clear();
     let rows: Vec<Vec<String>> = recordings
         .iter()
         .zip(&uploads)
@@ -224,12 +231,13 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
         let observations = client.observations(SITE, &recording.name).await?;
         runs.push(judged_run(recording, &observations, &run.truth, 0));
     }
-    let matches = client.matches(SITE, "").await?;
+    let matches = client.matches(SITE, &MatchFilter::default()).await?;
     let judged: Vec<JudgedMatch> = matches.iter().filter_map(|found| judged_match(found, &names)).collect();
     let recognition = judge_recognition(&runs, &judged);
     let num_verified = judged.iter().filter(|found| found.is_verified).count();
-    let num_between =
-        matches.iter().filter(|found| found.state == "verified" && found.earlier.run != found.later.run);
+    let num_between = matches
+        .iter()
+        .filter(|found| found.state == MatchState::Verified && found.earlier.run != found.later.run);
     println!("What was recognised (against the simulator's truth)");
     println!("  candidates          {}", judged.len());
     println!("  verified matches    {num_verified}, {} of them between two robots", num_between.count());
@@ -240,8 +248,8 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
     println!("  verified precision  {:.1} %", 100.0 * recognition.verified.precision);
     println!("  verified recall     {:.1} %", 100.0 * recognition.verified.recall_all);
 
-    let before = trajectory_errors(client, &names, simulated, "odom").await?;
-    let after = trajectory_errors(client, &names, simulated, "map").await?;
+    let before = trajectory_errors(client, &names, simulated, Frame::Odom).await?;
+    let after = trajectory_errors(client, &names, simulated, Frame::Map).await?;
     let rows: Vec<Vec<String>> =
         [("odometry, each robot by itself", before), ("map, all robots together", after)]
             .into_iter()
@@ -263,7 +271,7 @@ async fn report(client: &Client, recordings: &[Recording], simulated: &[Simulate
 
 /// Robots that share a frame, with their (estimated, true) poses.
 struct MapPart<'a> {
-    component: u64,
+    component: u32,
     names: Vec<&'a str>,
     pairs: Vec<(Pose2, Pose2)>,
 }
@@ -273,12 +281,12 @@ async fn trajectory_errors(
     client: &Client,
     names: &[&str],
     simulated: &[SimulatedRun],
-    frame: &str,
+    frame: Frame,
 ) -> Result<Vec<(String, TrajectoryError)>> {
     let mut parts: Vec<MapPart<'_>> = Vec::new();
     for (idx, (&name, run)) in names.iter().zip(simulated).enumerate() {
-        let trajectory = client.trajectory(SITE, name, frame).await?;
-        let component = trajectory.component.unwrap_or(idx as u64);
+        let trajectory = client.trajectory(SITE, name, frame, None).await?;
+        let component = trajectory.component.unwrap_or(idx as u32);
         let pairs = trajectory.poses.iter().filter_map(|pose| {
             let truth = run.truth.get(usize::try_from(pose.scan_seq).ok()?)?;
             Some((Pose2::new(pose.x, pose.y, pose.theta), truth.truth_from_robot))

@@ -2,13 +2,16 @@
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 mod demo;
+mod environment;
 mod eval;
+mod key;
 mod optimize;
 mod replay;
 mod serve;
+mod shell;
 mod simulate;
 mod upload;
 mod wire;
@@ -35,17 +38,28 @@ enum Command {
     Optimize(optimize::OptimizeArguments),
     /// Measure how well it works.
     Eval(eval::EvalArguments),
+    /// Make keys for servers that are reached from other machines.
+    Key(key::KeyArguments),
+    /// Print completions for a shell.
+    Completions(shell::CompletionsArguments),
+    /// Print the manual page, or write the pages of all commands.
+    Man(shell::ManArguments),
 }
 
 /// Reads the arguments, runs the command and says what went wrong.
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
+    let command = Arguments::parse().command;
+    environment::warn_of_unknown_variables();
+    let outcome = match command {
         Command::Serve(arguments) => serve::run(arguments),
         Command::Demo(arguments) => demo::run(&arguments),
         Command::Replay(arguments) => replay::run(&arguments),
         Command::Simulate(arguments) => simulate::run(&arguments),
         Command::Optimize(arguments) => optimize::run(&arguments),
         Command::Eval(arguments) => eval::run(&arguments),
+        Command::Key(arguments) => key::run(&arguments),
+        Command::Completions(arguments) => shell::print_completions(Arguments::command(), &arguments),
+        Command::Man(arguments) => shell::write_manual(Arguments::command(), &arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -1,18 +1,20 @@
 //! `locution optimize`: the least-squares poses of a graph in a file, robust against wrong closures if asked.
 
+use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::{Args, ValueEnum};
 use flate2::Compression;
-use flate2::read::GzDecoder;
 use flate2::write::GzEncoder;
 use locution_engine::formats::{GraphDocument, read_g2o, read_toro, write_g2o, write_toro};
 use locution_engine::pose_graph::{Kernel, PoseGraphConfig, RobustConfig, Start, optimize_robust};
 use serde::Serialize;
+
+use locution_lab::recordings::read_text;
 
 /// Reads and writes g2o and TORO, plain or as .gz; the input's format is told by its content, the output's by its
 /// name (`.graph` and `.toro` are TORO) and else that of the input.
@@ -67,11 +69,16 @@ struct OptimizeSummary {
     rejected_edges: usize,
     used_chordal_start: bool,
     stop_reason: String,
+    /// Lines that put no constraint on poses and were passed over, by tag.
+    lines_passed_over: BTreeMap<String, usize>,
 }
 
+/// The format of a graph's text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum GraphFormat {
+pub enum GraphFormat {
+    /// g2o.
     G2o,
+    /// TORO.
     Toro,
 }
 
@@ -80,13 +87,7 @@ enum GraphFormat {
 /// # Errors
 /// A file that cannot be read or written, a line that is no graph, a graph that cannot be solved.
 pub fn run(arguments: &OptimizeArguments) -> Result<()> {
-    let text = read_text(&arguments.input)?;
-    let format = format_of(&text);
-    let mut document = match format {
-        GraphFormat::G2o => read_g2o(&text),
-        GraphFormat::Toro => read_toro(&text),
-    }
-    .with_context(|| format!("cannot read {}", arguments.input.display()))?;
+    let (mut document, format) = read_graph(&arguments.input)?;
     let summary = solve(&mut document, arguments)?;
     if let Some(output) = &arguments.output {
         write_graph(output, &document, format)?;
@@ -97,6 +98,20 @@ pub fn run(arguments: &OptimizeArguments) -> Result<()> {
         print_summary(&summary);
     }
     Ok(())
+}
+
+/// Reads a graph of either format, plain or gzipped.
+///
+/// # Errors
+/// A file that cannot be read, or a line that is no graph, with its number.
+pub fn read_graph(path: &Path) -> Result<(GraphDocument, GraphFormat)> {
+    let text = read_text(path)?;
+    let format = format_of(&text);
+    let document = match format {
+        GraphFormat::G2o => read_g2o(&text),
+        GraphFormat::Toro => read_toro(&text),
+    };
+    Ok((document.with_context(|| format!("cannot read {}", path.display()))?, format))
 }
 
 fn solve(document: &mut GraphDocument, arguments: &OptimizeArguments) -> Result<OptimizeSummary> {
@@ -128,6 +143,7 @@ fn solve(document: &mut GraphDocument, arguments: &OptimizeArguments) -> Result<
         rejected_edges: outcome.num_rejected,
         used_chordal_start: report.used_chordal_start,
         stop_reason: format!("{:?}", report.stop_reason),
+        lines_passed_over: document.passed_over.clone(),
     })
 }
 
@@ -139,33 +155,20 @@ fn print_summary(summary: &OptimizeSummary) {
         "{} iterations{start} in {:.1} ms, {}; {} edges rejected",
         summary.iterations, summary.solve_ms, summary.stop_reason, summary.rejected_edges
     );
-}
-
-/// The first line that names something decides; an empty file is an empty g2o graph.
-fn format_of(text: &str) -> GraphFormat {
-    let first_tag = text
-        .lines()
-        .filter_map(|line| line.split_ascii_whitespace().next())
-        .find(|tag| !tag.starts_with('#'));
-    match first_tag {
-        Some("VERTEX2" | "VERTEX" | "EDGE2" | "EDGE" | "EQUIV") => GraphFormat::Toro,
-        _ => GraphFormat::G2o,
+    for (tag, count) in &summary.lines_passed_over {
+        println!("passed over {count} lines {tag}, which put no constraint on poses");
     }
 }
 
-/// The text of a file, unpacked if it begins with the two bytes of gzip.
-fn read_text(path: &Path) -> Result<String> {
-    let bytes = std::fs::read(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let unpacked = if bytes.starts_with(&[0x1f, 0x8b]) {
-        let mut unpacked = Vec::new();
-        GzDecoder::new(bytes.as_slice())
-            .read_to_end(&mut unpacked)
-            .with_context(|| format!("cannot unpack {}", path.display()))?;
-        unpacked
-    } else {
-        bytes
-    };
-    String::from_utf8(unpacked).with_context(|| format!("{} is not text", path.display()))
+/// The first line of a vertex or an edge decides; an empty file is an empty g2o graph.
+fn format_of(text: &str) -> GraphFormat {
+    let is_graph = |tag: &&str| ["VERTEX", "EDGE", "EQUIV"].iter().any(|start| tag.starts_with(start));
+    let tags =
+        text.lines().filter_map(|line| line.trim_start_matches('\u{feff}').split_ascii_whitespace().next());
+    match tags.into_iter().find(is_graph) {
+        Some("VERTEX2" | "VERTEX" | "EDGE2" | "EDGE" | "EQUIV") => GraphFormat::Toro,
+        _ => GraphFormat::G2o,
+    }
 }
 
 fn write_graph(path: &Path, document: &GraphDocument, input_format: GraphFormat) -> Result<()> {

@@ -5,11 +5,12 @@ use std::path::PathBuf;
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
 use futures::future::try_join_all;
-use indicatif::MultiProgress;
-use locution_client::{Client, Encoding};
+use locution_client::{Client, Encoding, MapAt, RunUpload};
 use locution_engine::formats::CarmenOptions;
 
-use super::upload::{UploadOptions, progress_bar, upload_recording};
+use super::upload::{
+    UploadOptions, Uploaded, build_with_progress, open_run, progress_bar, reach_server, upload_recording,
+};
 use locution_lab::recordings::{Recording, read_recording};
 
 /// How scans travel.
@@ -33,7 +34,7 @@ impl From<Format> for Encoding {
 /// Every file becomes a run; what the server already has of it is not sent again.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// CARMEN logs (FLASER or ROBOTLASER1), plain or gzipped; several are sent at once.
+    /// CARMEN logs (FLASER or ROBOTLASER1), plain or gzipped; runs are made in this order and sent at once.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The server.
@@ -51,7 +52,8 @@ pub struct ReplayArguments {
     /// Name of the run, when there is one file [default: the name of the file].
     #[arg(long)]
     run: Option<String>,
-    /// Times the recorded speed [default: as fast as the server takes them].
+    /// Times the recorded speed; gaps of more than 5 s between scans are not waited for [default: as fast as the
+    /// server takes them].
     #[arg(long)]
     rate: Option<f64>,
     /// How scans travel.
@@ -63,9 +65,15 @@ pub struct ReplayArguments {
     /// Readings at or above this many metres are no return [default: as the log shows].
     #[arg(long)]
     range_max: Option<f64>,
-    /// Pass over lines that cannot be read.
+    /// Angle that the readings of FLASER messages cover, degrees [default: as the log states].
+    #[arg(long, value_name = "DEGREES")]
+    fov: Option<f64>,
+    /// Pass over lines that cannot be read, and over what follows where a packed file is cut off.
     #[arg(long)]
     skip_malformed: bool,
+    /// Build the map when everything is posted, and wait for it.
+    #[arg(long)]
+    wait: bool,
     /// Leave the runs open for more scans.
     #[arg(long)]
     keep_open: bool,
@@ -82,8 +90,11 @@ pub fn run(arguments: &ReplayArguments) -> Result<()> {
     );
     ensure!(arguments.rate.is_none_or(|rate| rate > 0.0), "--rate must be above zero");
     ensure!(arguments.batch > 0, "--batch must be above zero");
-    let options =
-        CarmenOptions { range_max_m: arguments.range_max, skip_malformed: arguments.skip_malformed };
+    let options = CarmenOptions {
+        range_max_m: arguments.range_max,
+        field_of_view_deg: arguments.fov,
+        skip_malformed: arguments.skip_malformed,
+    };
     let mut recordings: Vec<Recording> = Vec::new();
     for file in &arguments.files {
         let mut recording = read_recording(file, options)?;
@@ -106,9 +117,11 @@ async fn replay(arguments: &ReplayArguments, recordings: &[Recording]) -> Result
     if let Some(api_key) = &arguments.api_key {
         client = client.with_api_key(api_key);
     }
+    reach_server(&client).await?;
     let site = arguments.site.as_str();
     // A site that stands with a configuration of its own is used as it is.
-    if client.site(site).await.is_err() {
+    if let Err(error) = client.site(site).await {
+        ensure!(error.problem().is_some_and(|problem| problem.status == 404), error);
         client.put_site(site, None).await?;
     }
     let options = UploadOptions {
@@ -117,26 +130,50 @@ async fn replay(arguments: &ReplayArguments, recordings: &[Recording]) -> Result
         rate: arguments.rate,
         is_finishing: !arguments.keep_open,
     };
-    let bars = MultiProgress::new();
-    let uploads = recordings.iter().map(|recording| {
-        let bar = progress_bar(&bars, &recording.name, recording.log.scans.len());
-        let (client, options) = (&client, &options);
-        async move {
-            let robot = arguments.robot.as_deref().unwrap_or(&recording.name);
-            upload_recording(client, (site, &recording.name, robot), &recording.log, options, &bar).await
-        }
+    // One after the other, since a site's runs are ordered by when they were made.
+    let mut opened: Vec<(&Recording, RunUpload)> = Vec::new();
+    for recording in recordings {
+        let robot = arguments.robot.as_deref().unwrap_or(&recording.name);
+        let names = (site, recording.name.as_str(), robot);
+        opened.push((recording, open_run(&client, names, &recording.log, &options).await?));
+    }
+    let num_scans = recordings.iter().map(|recording| recording.log.scans.len()).sum();
+    let bar = progress_bar(site, num_scans);
+    let uploads = opened.into_iter().map(|(recording, upload)| {
+        upload_recording(&client, (site, &recording.name), upload, &recording.log, &options, &bar)
     });
     let uploads = try_join_all(uploads).await?;
+    bar.finish_and_clear();
     for (recording, uploaded) in recordings.iter().zip(&uploads) {
-        println!(
-            "{}: {} scans posted in {:.1} s ({:.0} scans/s), {} observations, {} words",
-            recording.name,
-            uploaded.num_scans,
-            uploaded.duration_s,
-            uploaded.num_scans as f64 / uploaded.duration_s.max(1e-9),
-            uploaded.num_observations,
-            uploaded.num_words,
-        );
+        println!("{}", summary(&recording.name, uploaded));
     }
+    if arguments.wait {
+        build_with_progress(&client, site).await?;
+    }
+    print_where_to_look(&client, site, arguments.wait).await
+}
+
+fn summary(run: &str, uploaded: &Uploaded) -> String {
+    format!(
+        "{run}: {} scans posted in {:.1} s ({:.0} scans/s), {} observations, {} words",
+        uploaded.num_scans,
+        uploaded.duration_s,
+        uploaded.num_scans as f64 / uploaded.duration_s.max(1e-9),
+        uploaded.num_observations,
+        uploaded.num_words,
+    )
+}
+
+async fn print_where_to_look(client: &Client, site: &str, is_built: bool) -> Result<()> {
+    let url = client.base_url();
+    if is_built {
+        let map = client.map(site, MapAt::default()).await?;
+        println!("map version {} is served, in {} part(s)", map.version, map.components.len());
+    } else {
+        println!("the server builds the map in the background; --wait waits for it");
+    }
+    println!("to look at: {url}/ui");
+    println!("            {url}/v1/sites/{site}/map/picture.png");
+    println!("            {url}/v1/sites/{site}/map");
     Ok(())
 }

@@ -30,13 +30,13 @@ pub struct SimulateArguments {
     #[arg(long)]
     second_world: Option<PathBuf>,
     /// Waypoints in the world's frame, metres: "x,y x,y …".
-    #[arg(long, conflicts_with = "wander")]
+    #[arg(long, conflicts_with = "wander", allow_hyphen_values = true)]
     route: Option<String>,
-    /// Drive about to random places for this many metres.
+    /// Drive about to random places for this many metres; places at least 5 m off, or as far as the world allows.
     #[arg(long)]
     wander: Option<f64>,
     /// Where to begin to wander: "x,y" [default: at random].
-    #[arg(long, requires = "wander")]
+    #[arg(long, requires = "wander", allow_hyphen_values = true)]
     start: Option<String>,
     /// Chooses one of the possible recordings.
     #[arg(long, default_value_t = 1)]

@@ -9,6 +9,7 @@ use serde::de::DeserializeOwned;
 use tokio::time::{Instant, sleep};
 
 use crate::error::{ClientError, Problem};
+use crate::routes::{self, Query, Route};
 
 /// When to ask again.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,7 +61,7 @@ impl Body {
 }
 
 impl Client {
-    /// A client of the server at `base_url`, such as `http://127.0.0.1:7878`.
+    /// A client of the server at `base_url`, such as `http://127.0.0.1:7070`.
     ///
     /// # Errors
     /// The HTTP library cannot start.
@@ -142,16 +143,44 @@ impl Client {
         }
     }
 
-    pub(crate) async fn json<T: DeserializeOwned>(
+    /// The JSON answer of an operation.
+    pub(crate) async fn answer<T: DeserializeOwned>(
         &self,
-        method: Method,
-        path: &str,
+        route: &Route,
+        names: &[&str],
+        query: &Query,
         body: Body,
     ) -> Result<T, ClientError> {
-        let response = self.send(method, path, "application/json", body).await?;
+        let path = query.after(route.with(names));
+        let response = self.send(route.method.clone(), &path, "application/json", body).await?;
         let bytes = response.bytes().await.map_err(ClientError::Transport)?;
         serde_json::from_slice(&bytes)
-            .map_err(|error| ClientError::Answer { path: path.to_owned(), problem: error.to_string() })
+            .map_err(|error| ClientError::Answer { path: path.clone(), problem: error.to_string() })
+    }
+
+    /// The JSON answer of an operation that only looks.
+    pub(crate) async fn get<T: DeserializeOwned>(
+        &self,
+        route: &Route,
+        names: &[&str],
+        query: &Query,
+    ) -> Result<T, ClientError> {
+        self.answer(route, names, query, Body::Empty).await
+    }
+
+    /// An operation whose answer says nothing more.
+    pub(crate) async fn done(&self, route: &Route, names: &[&str], body: Body) -> Result<(), ClientError> {
+        self.send(route.method.clone(), &route.with(names), "application/json", body).await.map(drop)
+    }
+
+    /// The answer of an operation as it is.
+    pub(crate) async fn bytes(
+        &self,
+        route: &Route,
+        names: &[&str],
+        query: &Query,
+    ) -> Result<Vec<u8>, ClientError> {
+        self.download(&query.after(route.with(names)), "*/*").await
     }
 
     /// Any document of the API as it is, such as `/v1/sites/office/map/picture.png`.
@@ -163,10 +192,32 @@ impl Client {
         Ok(response.bytes().await.map_err(ClientError::Transport)?.to_vec())
     }
 
-    /// Whether the server is ready to work.
+    /// Whether the server is ready to work; asked once, without patience.
     pub async fn is_ready(&self) -> bool {
-        let answer = self.http.get(format!("{}/readyz", self.base_url)).send().await;
+        self.answers(&routes::GET_READINESS).await
+    }
+
+    /// Whether the process lives; asked once, without patience.
+    pub async fn is_alive(&self) -> bool {
+        self.answers(&routes::GET_HEALTH).await
+    }
+
+    async fn answers(&self, route: &Route) -> bool {
+        let answer = self.http.get(format!("{}{}", self.base_url, route.with(&[]))).send().await;
         answer.is_ok_and(|response| response.status().is_success())
+    }
+
+    /// Counters and histograms of the server in Prometheus' text format.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn metrics(&self) -> Result<Vec<u8>, ClientError> {
+        self.bytes(&routes::GET_METRICS, &[], &Query::default()).await
+    }
+
+    /// Where a person looks at sites, runs and maps.
+    pub fn page_url(&self) -> String {
+        format!("{}{}", self.base_url, routes::GET_UI.with(&[]))
     }
 }
 

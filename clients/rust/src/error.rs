@@ -43,10 +43,10 @@ pub enum ClientError {
     #[error("the request cannot be written: {0}")]
     Request(String),
     /// A job ended in failure.
-    #[error("the {kind} job failed: {error}")]
+    #[error("job {id} failed: {error}")]
     JobFailed {
-        /// What the job was to do.
-        kind: String,
+        /// The job.
+        id: String,
         /// Its own words.
         error: String,
     },

@@ -8,9 +8,9 @@
 //! # -> Result<(), locution_client::ClientError> {
 //! use locution_client::{Client, Encoding, NewRun};
 //!
-//! let client = Client::new("http://127.0.0.1:7878")?;
+//! let client = Client::new("http://127.0.0.1:7070")?;
 //! client.put_site("office", None).await?;
-//! let run = NewRun { robot: "robot-1".into(), geometry };
+//! let run = NewRun { robot: Some("robot-1".into()), geometry };
 //! let mut upload = client.start_upload("office", "monday", &run, Encoding::Cbor).await?;
 //! // After an interruption the upload begins where the server's copy ends.
 //! for batch in scans[upload.next_sequence() as usize..].chunks(100) {
@@ -26,18 +26,24 @@
 
 mod client;
 mod error;
+mod jobs;
 mod localizations;
 mod maps;
+mod matches;
 mod pages;
+mod queries;
+mod routes;
 mod runs;
+mod sites;
 mod types;
 mod upload;
 
+#[cfg(test)]
+mod document_tests;
+
 pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
-pub use localizations::{ExampleAnswer, Hypothesis, Localization, LocalizationState};
-pub use types::{
-    BatchAnswer, Geometry, Job, LabeledStretch, MatchInterval, NewRun, Observation, PlaceMatch, Pose,
-    RunStatus, Scan, SiteStatus, StampedPose, Trajectory, Word, WordId,
-};
+pub use maps::{MapAt, MapForm};
+pub use matches::MatchFilter;
+pub use types::*;
 pub use upload::{Encoding, RunUpload};

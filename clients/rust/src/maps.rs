@@ -1,83 +1,126 @@
-//! Matches, builds and maps.
+//! The map, its forms and places, and what changed in it.
 
-use reqwest::Method;
-
-use crate::client::{Body, Client};
+use crate::client::Client;
 use crate::error::ClientError;
-use crate::types::{Job, LabeledStretch, PlaceMatch};
+use crate::routes::{self, Query, Route};
+use crate::types::{self, Change, Grid, Label, Map, Place, Point};
 
-impl Client {
-    /// All matches of a site that pass the filter, a query such as `state=verified` or nothing.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn matches(&self, site: &str, filter: &str) -> Result<Vec<PlaceMatch>, ClientError> {
-        let query = if filter.is_empty() { String::new() } else { format!("?{filter}") };
-        self.all_pages(&format!("/v1/sites/{site}/matches{query}")).await
+/// Which version of the map, and which part of it.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct MapAt {
+    /// The version; the serving one unless said.
+    pub version: Option<u64>,
+    /// The component; for grids the first unless said, elsewhere all.
+    pub component: Option<u32>,
+}
+
+impl MapAt {
+    fn query(&self) -> Query {
+        Query::default().and("version", self.version).and("component", self.component)
     }
+}
 
-    /// Builds the map of everything stored and waits for it.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn build_map(&self, site: &str) -> Result<Job, ClientError> {
-        let path = format!("/v1/sites/{site}/builds?wait=true");
-        let job: Job = self.json(Method::POST, &path, Body::Empty).await?;
-        self.finished(site, job).await
-    }
+/// The map in the formats of other tools.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MapForm {
+    /// The occupancy grid as PGM, for `map_server`.
+    GridPgm,
+    /// The occupancy grid as PNG.
+    GridPng,
+    /// What `map_server` wants to know of the grid.
+    GridYaml,
+    /// The pose graph.
+    GraphG2o,
+    /// Poses of all scans of all runs in the TUM format.
+    TrajectoryTum,
+    /// Walls, runs and matches, drawn.
+    PicturePng,
+    /// The same as vectors.
+    PictureSvg,
+}
 
-    /// Begins to build the map; [`Client::job`] tells how far it is.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn start_build(&self, site: &str) -> Result<Job, ClientError> {
-        self.json(Method::POST, &format!("/v1/sites/{site}/builds"), Body::Empty).await
-    }
-
-    /// A job as it stands.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn job(&self, site: &str, job: &Job) -> Result<Job, ClientError> {
-        let id = match &job.id {
-            serde_json::Value::String(id) => id.clone(),
-            other => other.to_string(),
-        };
-        self.json(Method::GET, &format!("/v1/sites/{site}/jobs/{id}"), Body::Empty).await
-    }
-
-    /// Waits until a job is done.
-    ///
-    /// # Errors
-    /// See [`ClientError`]; a job that failed.
-    pub async fn finished(&self, site: &str, job: Job) -> Result<Job, ClientError> {
-        let mut job = job;
-        loop {
-            match job.state.as_str() {
-                "done" => return Ok(job),
-                "failed" => {
-                    let error = job.error.or(job.detail).unwrap_or_default();
-                    return Err(ClientError::JobFailed { kind: job.kind, error });
-                }
-                _ => tokio::time::sleep(std::time::Duration::from_millis(200)).await,
-            }
-            job = self.job(site, &job).await?;
+impl MapForm {
+    fn route(self) -> &'static Route {
+        match self {
+            Self::GridPgm => &routes::GET_GRID_PGM,
+            Self::GridPng => &routes::GET_GRID_PNG,
+            Self::GridYaml => &routes::GET_GRID_YAML,
+            Self::GraphG2o => &routes::GET_GRAPH_G2O,
+            Self::TrajectoryTum => &routes::GET_MAP_TUM,
+            Self::PicturePng => &routes::GET_PICTURE_PNG,
+            Self::PictureSvg => &routes::GET_PICTURE_SVG,
         }
     }
+}
 
-    /// The map as its JSON document.
+impl Client {
+    /// Regions, connections, components and trajectories of the map.
     ///
     /// # Errors
-    /// See [`ClientError`].
-    pub async fn map(&self, site: &str) -> Result<serde_json::Value, ClientError> {
-        self.json(Method::GET, &format!("/v1/sites/{site}/map"), Body::Empty).await
+    /// See [`ClientError`]; 409 before the first build.
+    pub async fn map(&self, site: &str, at: MapAt) -> Result<Map, ClientError> {
+        self.get(&routes::GET_MAP, &[site], &at.query()).await
+    }
+
+    /// The occupancy grid of a component.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 409 before the first build.
+    pub async fn grid(&self, site: &str, at: MapAt) -> Result<Grid, ClientError> {
+        self.get(&routes::GET_GRID, &[site], &at.query()).await
+    }
+
+    /// The map in another tool's format.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 409 before the first build.
+    pub async fn map_as(&self, site: &str, form: MapForm, at: MapAt) -> Result<Vec<u8>, ClientError> {
+        self.bytes(form.route(), &[site], &at.query()).await
     }
 
     /// All labelled stretches of driving.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn labels(&self, site: &str) -> Result<Vec<LabeledStretch>, ClientError> {
-        self.all_pages(&format!("/v1/sites/{site}/labels")).await
+    pub async fn labels(&self, site: &str) -> Result<Vec<Label>, ClientError> {
+        self.all(&routes::LIST_LABELS, &[site], Query::default()).await
+    }
+
+    /// The places of a component, voted over all passes.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn places(&self, site: &str, at: MapAt) -> Result<Vec<Place>, ClientError> {
+        self.all(&routes::LIST_PLACES, &[site], at.query()).await
+    }
+
+    /// The shortest way over driven ground.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 404 where nothing was driven.
+    pub async fn route(
+        &self,
+        site: &str,
+        from: Point,
+        to: Point,
+        at: MapAt,
+    ) -> Result<types::Route, ClientError> {
+        let query = at.query().and("from_x", Some(from.x)).and("from_y", Some(from.y));
+        self.get(&routes::GET_ROUTE, &[site], &query.and("to_x", Some(to.x)).and("to_y", Some(to.y))).await
+    }
+
+    /// What changed between two sessions, each a list of runs: the latest run against all others unless said.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn changes(
+        &self,
+        site: &str,
+        before: Option<&[&str]>,
+        after: Option<&[&str]>,
+    ) -> Result<Vec<Change>, ClientError> {
+        let names = |runs: Option<&[&str]>| runs.map(|runs| runs.join(","));
+        let query = Query::default().and("before", names(before)).and("after", names(after));
+        self.all(&routes::LIST_CHANGES, &[site], query).await
     }
 }

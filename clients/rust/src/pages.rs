@@ -1,11 +1,13 @@
 //! Lists come in pages.
 
-use reqwest::Method;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use crate::client::{Body, Client};
+use crate::client::Client;
 use crate::error::ClientError;
+use crate::routes::{Query, Route};
+
+const NUM_ITEMS_PER_PAGE: u32 = 1_000;
 
 #[derive(Deserialize)]
 struct Page<T> {
@@ -14,19 +16,23 @@ struct Page<T> {
 }
 
 impl Client {
-    /// All items of a list; `path` may have a query of its own.
-    pub(crate) async fn all_pages<T: DeserializeOwned>(&self, path: &str) -> Result<Vec<T>, ClientError> {
-        let separator = if path.contains('?') { '&' } else { '?' };
-        let first = format!("{path}{separator}limit=1000");
+    /// All items of a list, page after page.
+    pub(crate) async fn all<T: DeserializeOwned>(
+        &self,
+        route: &Route,
+        names: &[&str],
+        query: Query,
+    ) -> Result<Vec<T>, ClientError> {
+        let query = query.and("limit", Some(NUM_ITEMS_PER_PAGE));
         let mut items = Vec::new();
-        let mut next = first.clone();
+        let mut cursor = None;
         loop {
-            let page: Page<T> = self.json(Method::GET, &next, Body::Empty).await?;
+            let page: Page<T> = self.get(route, names, &query.clone().and("cursor", cursor)).await?;
             items.extend(page.items);
-            match page.next_cursor {
-                Some(cursor) => next = format!("{first}&cursor={}", percent_encoded(&cursor)),
-                None => return Ok(items),
+            if page.next_cursor.is_none() {
+                return Ok(items);
             }
+            cursor = page.next_cursor;
         }
     }
 }

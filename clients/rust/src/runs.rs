@@ -1,77 +1,49 @@
-//! Sites, runs and what was read from them.
-
-use reqwest::Method;
+//! Runs and what was read from them.
 
 use crate::client::{Body, Client};
 use crate::error::ClientError;
-use crate::types::{NewRun, Observation, RunStatus, SiteStatus, Trajectory, Word};
+use crate::routes::{self, Query};
+use crate::types::{Frame, NewRun, Observation, Run, StoredScan, Trajectory, Word};
 
 impl Client {
-    /// Makes a site, or finds it as it stands. `config` is the engine's, whole or in part.
-    ///
-    /// # Errors
-    /// See [`ClientError`]; 409 when it stands with another configuration.
-    pub async fn put_site(
-        &self,
-        site: &str,
-        config: Option<&serde_json::Value>,
-    ) -> Result<SiteStatus, ClientError> {
-        let body = match config {
-            Some(config) => serde_json::json!({ "config": config }),
-            None => serde_json::json!({}),
-        };
-        self.json(Method::PUT, &format!("/v1/sites/{site}"), Body::json(&body)?).await
-    }
-
-    /// A site as it stands.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn site(&self, site: &str) -> Result<SiteStatus, ClientError> {
-        self.json(Method::GET, &format!("/v1/sites/{site}"), Body::Empty).await
-    }
-
-    /// Deletes a site with everything in it.
-    ///
-    /// # Errors
-    /// See [`ClientError`].
-    pub async fn delete_site(&self, site: &str) -> Result<(), ClientError> {
-        self.send(Method::DELETE, &format!("/v1/sites/{site}"), "application/json", Body::Empty)
-            .await
-            .map(drop)
-    }
-
     /// Makes a run, or finds it as it stands.
     ///
     /// # Errors
     /// See [`ClientError`]; 409 when it stands with another geometry.
-    pub async fn put_run(&self, site: &str, run: &str, new_run: &NewRun) -> Result<RunStatus, ClientError> {
-        self.json(Method::PUT, &format!("/v1/sites/{site}/runs/{run}"), Body::json(new_run)?).await
+    pub async fn put_run(&self, site: &str, run: &str, new_run: &NewRun) -> Result<Run, ClientError> {
+        self.answer(&routes::MAKE_RUN, &[site, run], &Query::default(), Body::json(new_run)?).await
     }
 
     /// A run as it stands.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn run(&self, site: &str, run: &str) -> Result<RunStatus, ClientError> {
-        self.json(Method::GET, &format!("/v1/sites/{site}/runs/{run}"), Body::Empty).await
+    pub async fn run(&self, site: &str, run: &str) -> Result<Run, ClientError> {
+        self.get(&routes::GET_RUN, &[site, run], &Query::default()).await
     }
 
     /// All runs of a site.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn runs(&self, site: &str) -> Result<Vec<RunStatus>, ClientError> {
-        self.all_pages(&format!("/v1/sites/{site}/runs")).await
+    pub async fn runs(&self, site: &str) -> Result<Vec<Run>, ClientError> {
+        self.all(&routes::LIST_RUNS, &[site], Query::default()).await
     }
 
     /// Says that no more scans will come, so that delayed observations and pending words are written.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn finish_run(&self, site: &str, run: &str) -> Result<(), ClientError> {
-        let path = format!("/v1/sites/{site}/runs/{run}/finish");
-        self.send(Method::POST, &path, "application/json", Body::Empty).await.map(drop)
+    pub async fn finish_run(&self, site: &str, run: &str) -> Result<Run, ClientError> {
+        self.answer(&routes::FINISH_RUN, &[site, run], &Query::default(), Body::Empty).await
+    }
+
+    /// All stored scans of a run.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn scans(&self, site: &str, run: &str) -> Result<Vec<StoredScan>, ClientError> {
+        self.all(&routes::LIST_SCANS, &[site, run], Query::default()).await
     }
 
     /// All observations of a run.
@@ -79,24 +51,38 @@ impl Client {
     /// # Errors
     /// See [`ClientError`].
     pub async fn observations(&self, site: &str, run: &str) -> Result<Vec<Observation>, ClientError> {
-        self.all_pages(&format!("/v1/sites/{site}/runs/{run}/observations")).await
+        self.all(&routes::LIST_OBSERVATIONS, &[site, run], Query::default()).await
     }
 
-    /// All words of a run, of one level or of all.
+    /// All words of one level of a run; 0 holds them as observed.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn words(&self, site: &str, run: &str, level: Option<u8>) -> Result<Vec<Word>, ClientError> {
-        let query = level.map_or(String::new(), |level| format!("?level={level}"));
-        self.all_pages(&format!("/v1/sites/{site}/runs/{run}/words{query}")).await
+    pub async fn words(&self, site: &str, run: &str, level: u8) -> Result<Vec<Word>, ClientError> {
+        self.all(&routes::LIST_WORDS, &[site, run], Query::default().and("level", Some(level))).await
     }
 
-    /// A pose for every scan of a run in frame `map`, `run` or `odom`.
+    /// A pose for every scan of a run; `version` counts in the map frame only, where `None` is the serving one.
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn trajectory(&self, site: &str, run: &str, frame: &str) -> Result<Trajectory, ClientError> {
-        let path = format!("/v1/sites/{site}/runs/{run}/trajectory?frame={frame}");
-        self.json(Method::GET, &path, Body::Empty).await
+    pub async fn trajectory(
+        &self,
+        site: &str,
+        run: &str,
+        frame: Frame,
+        version: Option<u64>,
+    ) -> Result<Trajectory, ClientError> {
+        let query = Query::default().and("frame", Some(frame.as_str())).and("version", version);
+        self.get(&routes::GET_TRAJECTORY, &[site, run], &query).await
+    }
+
+    /// The same as text in the TUM format.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn trajectory_tum(&self, site: &str, run: &str, frame: Frame) -> Result<Vec<u8>, ClientError> {
+        let query = Query::default().and("frame", Some(frame.as_str()));
+        self.bytes(&routes::GET_TRAJECTORY_TUM, &[site, run], &query).await
     }
 }

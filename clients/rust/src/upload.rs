@@ -1,11 +1,11 @@
 //! Posting the scans of a run in order, from wherever the server's copy ends.
 
-use reqwest::Method;
 use serde::{Deserialize, Serialize};
 
 use crate::client::{Body, Client};
 use crate::error::ClientError;
-use crate::types::{BatchAnswer, NewRun, RunStatus, Scan};
+use crate::routes::{self, Query};
+use crate::types::{NewRun, Receipt, Run, RunState, Scan};
 
 /// How scans travel.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -40,9 +40,9 @@ pub(crate) fn batch_body(
 #[derive(Clone, Debug)]
 pub struct RunUpload {
     client: Client,
-    batches_path: String,
+    site: String,
     encoding: Encoding,
-    status: RunStatus,
+    run: Run,
 }
 
 impl Client {
@@ -57,21 +57,20 @@ impl Client {
         new_run: &NewRun,
         encoding: Encoding,
     ) -> Result<RunUpload, ClientError> {
-        let status = self.put_run(site, run, new_run).await?;
-        let batches_path = format!("/v1/sites/{site}/runs/{run}/batches");
-        Ok(RunUpload { client: self.clone(), batches_path, encoding, status })
+        let run = self.put_run(site, run, new_run).await?;
+        Ok(RunUpload { client: self.clone(), site: site.to_owned(), encoding, run })
     }
 }
 
 impl RunUpload {
     /// Sequence number of the first scan that the server does not have.
     pub fn next_sequence(&self) -> u64 {
-        self.status.next_sequence
+        self.run.next_sequence
     }
 
     /// Whether the server takes no more scans of this run.
     pub fn is_finished(&self) -> bool {
-        self.status.state == "finished"
+        self.run.state == RunState::Finished
     }
 
     /// Posts the next scans. When this returns they are on the server's disk; a repetition after a lost answer
@@ -79,12 +78,15 @@ impl RunUpload {
     ///
     /// # Errors
     /// See [`ClientError`].
-    pub async fn post(&mut self, scans: &[Scan]) -> Result<BatchAnswer, ClientError> {
-        let body = batch_body(self.status.next_sequence, scans, self.encoding)?;
-        let answer: BatchAnswer = self.client.json(Method::POST, &self.batches_path, body).await?;
-        self.status.next_sequence = answer.next_sequence;
-        self.status.num_observations = answer.num_observations;
-        self.status.num_words = answer.num_words;
-        Ok(answer)
+    pub async fn post(&mut self, scans: &[Scan]) -> Result<Receipt, ClientError> {
+        let body = batch_body(self.run.next_sequence, scans, self.encoding)?;
+        let names = [self.site.as_str(), self.run.run.as_str()];
+        let receipt: Receipt =
+            self.client.answer(&routes::APPEND_BATCH, &names, &Query::default(), body).await?;
+        self.run.next_sequence = receipt.next_sequence;
+        self.run.num_scans = receipt.next_sequence;
+        self.run.num_observations = receipt.num_observations;
+        self.run.num_words = receipt.num_words;
+        Ok(receipt)
     }
 }

@@ -7,9 +7,11 @@
 //!
 //! `x y theta` is where the laser was and `odom_*` where the robot was, both by odometry, which gives the mounting
 //! of the laser. Some logs carry a *corrected* pose in `x y theta`, so odometry is only ever read from `odom_*`.
-//! All other messages are passed over.
+//! PARAM lines may say which angle a FLASER message covers; all other messages are passed over.
 
 use super::decimal_time::parse_seconds_ns;
+use super::fields::without_mark;
+use super::flaser_beams::{BeamAngles, StatedLaser};
 use super::{Fields, FormatError};
 use crate::geometry::Pose2;
 use crate::scan::{Scan, ScanGeometry};
@@ -17,7 +19,7 @@ use crate::scan::{Scan, ScanGeometry};
 /// Which message carried a scan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CarmenMessage {
-    /// The older message; its beam angles follow from the number of readings.
+    /// The older message; its beam angles are stated by the log, or follow from the number of readings.
     Flaser,
     /// The newer message; it describes its sensor.
     RobotLaser1,
@@ -28,10 +30,8 @@ pub enum CarmenMessage {
 pub struct CarmenScan {
     /// The message.
     pub message: CarmenMessage,
-    /// Direction of the first beam in the laser's frame.
-    pub angle_min_rad: f64,
-    /// From one beam to the next.
-    pub angle_increment_rad: f64,
+    /// Where the beams point, where the message says it.
+    pub beams: Option<BeamAngles>,
     /// Maximum range, where the message says it.
     pub range_max_m: Option<f64>,
     /// The laser seen from the robot, by the two poses of the line.
@@ -45,6 +45,8 @@ pub struct CarmenScan {
 pub struct CarmenOptions {
     /// Readings at or above this are "no return"; `None` infers it from the log.
     pub range_max_m: Option<f64>,
+    /// Angle that the readings of a FLASER message cover; `None` takes it from the log. The newer message says it.
+    pub field_of_view_deg: Option<f64>,
     /// Pass over lines that cannot be read, such as a last line that was cut off, instead of failing.
     pub skip_malformed: bool,
 }
@@ -80,7 +82,8 @@ pub fn parse_carmen_line(line: &str, line_number: usize) -> Result<Option<Carmen
 ///
 /// # Errors
 /// The first line that cannot be read (unless the options pass over them) or whose scan has another number of
-/// readings or other angles than the first; a log without any scan.
+/// readings or other angles than the first; a log without any scan, or whose readings cover an angle that nothing
+/// tells, or are no metres.
 pub fn read_carmen_log<'a>(
     lines: impl IntoIterator<Item = &'a str>,
     options: &CarmenOptions,
@@ -97,7 +100,9 @@ pub fn read_carmen_log<'a>(
 pub struct CarmenReader {
     options: CarmenOptions,
     num_lines: usize,
-    first: Option<CarmenScan>,
+    laser: StatedLaser,
+    /// The scan that was taken first, and its line.
+    first: Option<(usize, CarmenScan)>,
     mountings: Vec<Pose2>,
     scans: Vec<Scan>,
     skipped: Vec<FormatError>,
@@ -107,15 +112,21 @@ impl CarmenReader {
     /// A reader that has seen no line.
     pub fn new(options: CarmenOptions) -> Self {
         let (mountings, scans, skipped) = (Vec::new(), Vec::new(), Vec::new());
-        Self { options, num_lines: 0, first: None, mountings, scans, skipped }
+        let laser = StatedLaser::default();
+        Self { options, num_lines: 0, laser, first: None, mountings, scans, skipped }
     }
 
-    /// Takes the next line, without its line end.
+    /// Takes the next line, without its line feed.
     ///
     /// # Errors
     /// As [`read_carmen_log`].
     pub fn push_line(&mut self, line: &str) -> Result<(), FormatError> {
         self.num_lines += 1;
+        let line = if self.num_lines == 1 { without_mark(line) } else { line };
+        if let Some(parameter) = line.strip_prefix("PARAM ") {
+            self.laser.note(&mut Fields::new(parameter, self.num_lines));
+            return Ok(());
+        }
         let taken = parse_carmen_line(line, self.num_lines).and_then(|scan| self.take(scan));
         match taken {
             Err(error) if self.options.skip_malformed => self.skipped.push(error),
@@ -126,7 +137,7 @@ impl CarmenReader {
 
     fn take(&mut self, scan: Option<CarmenScan>) -> Result<(), FormatError> {
         let Some(scan) = scan else { return Ok(()) };
-        if let Some(first) = &self.first {
+        if let Some((_, first)) = &self.first {
             if first.message != scan.message {
                 return Ok(());
             }
@@ -135,9 +146,10 @@ impl CarmenReader {
                 let problem = format!("{given} readings, but the first scan of the log has {expected}");
                 return Err(FormatError::new(self.num_lines, problem));
             }
-            if (first.angle_min_rad - scan.angle_min_rad).abs() > 1e-6
-                || (first.angle_increment_rad - scan.angle_increment_rad).abs() > 1e-9
-            {
+            let differ = |a: BeamAngles, b: BeamAngles| {
+                (a.min_rad - b.min_rad).abs() > 1e-6 || (a.increment_rad - b.increment_rad).abs() > 1e-9
+            };
+            if first.beams.zip(scan.beams).is_some_and(|(a, b)| differ(a, b)) {
                 return Err(FormatError::new(
                     self.num_lines,
                     "beam angles differ from the first scan of the log",
@@ -146,22 +158,31 @@ impl CarmenReader {
         }
         self.mountings.push(scan.robot_from_laser);
         self.scans.push(scan.scan.clone());
-        self.first.get_or_insert(scan);
+        self.first.get_or_insert((self.num_lines, scan));
         Ok(())
     }
 
     /// The recording.
     ///
     /// # Errors
-    /// No line carried a scan.
+    /// No line carried a scan; nothing tells the angles of the beams; the readings are no metres.
     pub fn finish(self) -> Result<CarmenLog, FormatError> {
-        let Some(first) = &self.first else {
+        let Some((line, first)) = &self.first else {
             return Err(FormatError::new(self.num_lines, "the log holds no FLASER or ROBOTLASER1 message"));
         };
+        let num_ranges = first.scan.ranges_m.len();
+        let beams = match first.beams {
+            Some(beams) => beams,
+            None => self
+                .laser
+                .beams(num_ranges, self.options.field_of_view_deg)
+                .map_err(|problem| FormatError::new(*line, problem))?,
+        };
+        check_meters(&self.scans, *line)?;
         let geometry = ScanGeometry {
-            num_ranges: first.scan.ranges_m.len(),
-            angle_min_rad: first.angle_min_rad,
-            angle_increment_rad: first.angle_increment_rad,
+            num_ranges,
+            angle_min_rad: beams.min_rad,
+            angle_increment_rad: beams.increment_rad,
             range_max_m: self
                 .options
                 .range_max_m
@@ -177,11 +198,9 @@ fn parse_flaser(fields: &mut Fields<'_>) -> Result<CarmenScan, FormatError> {
     let odom_from_laser = fields.pose("laser pose")?;
     let odom_from_robot = fields.pose("odometry pose")?;
     let timestamp_ns = parse_timestamp(fields)?;
-    let increment_deg = 180.0 / (ranges_m.len() - ranges_m.len() % 2) as f64;
     Ok(CarmenScan {
         message: CarmenMessage::Flaser,
-        angle_min_rad: (-90.0f64).to_radians(),
-        angle_increment_rad: increment_deg.to_radians(),
+        beams: None,
         range_max_m: None,
         robot_from_laser: odom_from_robot.between(&odom_from_laser),
         scan: Scan { timestamp_ns, odom_from_robot, ranges_m },
@@ -193,6 +212,11 @@ fn parse_robot_laser(fields: &mut Fields<'_>) -> Result<CarmenScan, FormatError>
     let angle_min_rad = fields.number("start angle")?;
     let field_of_view_rad = fields.number("field of view")?;
     let resolution_rad = fields.number("angular resolution")?;
+    for (name, angle_rad) in [("start angle", angle_min_rad), ("field of view", field_of_view_rad)] {
+        if angle_rad.abs() > 1.001 * std::f64::consts::TAU {
+            return Err(fields.error(format!("{name} is {angle_rad} rad, more than a full turn: degrees?")));
+        }
+    }
     // Through 32 bits like the readings, so that a reading of the same text is not below it.
     let range_max_m = f64::from(fields.number("maximum range")? as f32);
     fields.number("accuracy")?;
@@ -214,8 +238,7 @@ fn parse_robot_laser(fields: &mut Fields<'_>) -> Result<CarmenScan, FormatError>
         if resolution_rad == 0.0 { field_of_view_rad / ranges_m.len() as f64 } else { resolution_rad };
     Ok(CarmenScan {
         message: CarmenMessage::RobotLaser1,
-        angle_min_rad,
-        angle_increment_rad,
+        beams: Some(BeamAngles { min_rad: angle_min_rad, increment_rad: angle_increment_rad }),
         range_max_m: (range_max_m > 0.0).then_some(range_max_m),
         robot_from_laser: odom_from_robot.between(&odom_from_laser),
         scan: Scan { timestamp_ns, odom_from_robot, ranges_m },
@@ -244,6 +267,20 @@ fn parse_timestamp(fields: &mut Fields<'_>) -> Result<i64, FormatError> {
     let word = fields.word_or("ipc_timestamp", 0)?;
     parse_seconds_ns(word)
         .ok_or_else(|| fields.error(format!("ipc_timestamp '{word}' is not a number of seconds")))
+}
+
+/// No laser sees farther than this, metres.
+const PLAUSIBLE_RANGE_M: f32 = 200.0;
+
+/// Refuses a log most of whose readings are no metres.
+fn check_meters(scans: &[Scan], line: usize) -> Result<(), FormatError> {
+    let readings = || scans.iter().flat_map(|scan| &scan.ranges_m).filter(|range| range.is_finite());
+    let num_far = readings().filter(|&&range| range > PLAUSIBLE_RANGE_M).count();
+    if 2 * num_far > readings().count() {
+        let problem = "most readings of the log are beyond 200 m: they must be metres, not millimetres";
+        return Err(FormatError::new(line, problem));
+    }
+    Ok(())
 }
 
 /// Where "no return" begins.
@@ -302,9 +339,9 @@ mod tests {
 
     #[test]
     fn flaser_gives_odometry_mounting_and_exact_time() {
-        let line = flaser("1.5 2.5 81.83 0", "1.0 2.25 1.5707963 1.0 2.0 1.5707963", "976052857.337284");
+        let line = flaser("1.5 2.5 81.83 0 0", "1.0 2.25 1.5707963 1.0 2.0 1.5707963", "976052857.337284");
         let log = read(&format!("# comment\nPARAM x 1 nohost 0\nODOM 0 0 0 0 0 0 1 h 1\n{line}\n")).unwrap();
-        assert_eq!(log.geometry.num_ranges, 4);
+        assert_eq!(log.geometry.num_ranges, 5);
         assert_eq!(log.geometry.robot_from_laser, Pose2::new(0.25, 0.0, 0.0));
         assert_eq!(log.geometry.range_max_m, f64::from(81.83f32));
         assert_eq!(log.scans.len(), 1);
@@ -349,8 +386,39 @@ mod tests {
         assert_eq!(log.geometry.range_max_m, f64::from(81.83f32));
         // One far wall among very many near ones is a wall.
         let ranges: Vec<String> = (0..30_000).map(|idx| format!("{}", f64::from(idx % 7) + 1.0)).collect();
-        let log = read(&flaser(&format!("{} 12.5", ranges.join(" ")), "0 0 0 0 0 0", "1")).unwrap();
+        let line = flaser(&format!("{} 12.5", ranges.join(" ")), "0 0 0 0 0 0", "1");
+        let options = CarmenOptions { field_of_view_deg: Some(270.0), ..CarmenOptions::default() };
+        let log = read_carmen_log([line.as_str()], &options).unwrap();
         assert!(log.geometry.is_return(12.5));
+    }
+
+    #[test]
+    fn a_log_may_begin_with_a_byte_order_mark_and_end_its_lines_as_windows_does() {
+        let line = flaser("1 2 2", "0 0 0 0 0 0", "1");
+        let mut reader = CarmenReader::new(CarmenOptions::default());
+        for line in [format!("\u{feff}{line}\r"), format!("{line}\r")] {
+            reader.push_line(&line).unwrap();
+        }
+        assert_eq!(reader.finish().unwrap().scans.len(), 2);
+    }
+
+    #[test]
+    fn parameters_of_the_log_tell_the_angles() {
+        let line = flaser(&vec!["1.0"; 682].join(" "), "0 0 0 0 0 0", "1.0");
+        let problem = read(&line).unwrap_err();
+        assert!(problem.line == 1 && problem.problem.contains("682 readings"), "{problem}");
+        let parameter = "PARAM laser_front_laser_fov 239.77 nohost 0\n";
+        let geometry = read(&format!("{parameter}{line}")).unwrap().geometry;
+        assert!((geometry.angle_increment_rad - 0.006_136).abs() < 1e-6);
+        assert!((geometry.angle_min_rad + 2.092_388).abs() < 1e-6);
+    }
+
+    #[test]
+    fn what_cannot_be_metres_or_radians_is_told() {
+        let millimetres = flaser("1000 2000 3000", "0 0 0 0 0 0", "1");
+        assert!(read(&millimetres).unwrap_err().problem.contains("metres"));
+        let degrees = "ROBOTLASER1 0 -90 180 1 80 0.01 0 3 1 2 3 0 0 0 0 0 0 0 0 0 0 0 0 1 h 1";
+        assert!(read(degrees).unwrap_err().problem.contains("degrees"));
     }
 
     #[test]
@@ -363,14 +431,14 @@ mod tests {
     #[test]
     fn a_corrected_laser_pose_says_nothing_about_the_mounting() {
         let lines: Vec<String> =
-            (0..9).map(|idx| flaser("1 2", &format!("{idx} {} 0.5 0 0 0", 2 * idx), "1")).collect();
+            (0..9).map(|idx| flaser("1 2 2", &format!("{idx} {} 0.5 0 0 0", 2 * idx), "1")).collect();
         let log = read(&lines.join("\n")).unwrap();
         assert_eq!(log.geometry.robot_from_laser, Pose2::identity());
     }
 
     #[test]
     fn errors_say_line_and_cause() {
-        let good = flaser("1 2", "0 0 0 0 0 0", "1");
+        let good = flaser("1 2 2", "0 0 0 0 0 0", "1");
         for (bad, problem) in [
             ("FLASER", "the line ends before the number of readings"),
             ("FLASER x 1 2", "number of readings is 'x', not a count"),
@@ -379,7 +447,7 @@ mod tests {
             ("FLASER 2 1.0 wall 0 0 0 0 0 0 1 h 1", "reading 1 is 'wall', not a number"),
             ("FLASER 2 1.0 2.0 0 0 0 0 nan 0 1 h 1", "odometry pose is 'nan', not a finite number"),
             ("FLASER 2 1.0 2.0 0 0 0 0 0 0 now h 1", "ipc_timestamp 'now' is not a number of seconds"),
-            ("FLASER 3 1 2 3 0 0 0 0 0 0 1 h 1", "3 readings, but the first scan of the log has 2"),
+            ("FLASER 2 1 2 0 0 0 0 0 0 1 h 1", "2 readings, but the first scan of the log has 3"),
         ] {
             let error = read(&format!("{good}\n{bad}\n")).unwrap_err();
             assert_eq!((error.line, error.problem.as_str()), (2, problem));
@@ -394,7 +462,7 @@ mod tests {
     #[test]
     fn malformed_lines_can_be_passed_over() {
         let options = CarmenOptions { skip_malformed: true, ..CarmenOptions::default() };
-        let good = flaser("1 2", "0 0 0 0 0 0", "1");
+        let good = flaser("1 2 2", "0 0 0 0 0 0", "1");
         let text = format!("{good}\n{good}\n{}", &good[..12]);
         let log = read_carmen_log(text.lines(), &options).unwrap();
         assert_eq!((log.scans.len(), log.skipped.len(), log.skipped[0].line), (2, 1, 3));

@@ -63,9 +63,15 @@ impl<'a> Fields<'a> {
     }
 }
 
+/// A text without the byte order mark that some editors put before its first character.
+pub(super) fn without_mark(text: &str) -> &str {
+    text.strip_prefix('\u{feff}').unwrap_or(text)
+}
+
 /// Lines that hold something, with their number from 1: neither empty nor a `#` comment.
 pub(super) fn content_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
-    text.lines()
+    without_mark(text)
+        .lines()
         .enumerate()
         .map(|(idx, line)| (idx + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'))

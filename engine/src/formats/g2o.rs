@@ -12,16 +12,18 @@ use std::fmt::Write as _;
 
 use nalgebra::Matrix3;
 
+use super::fields::without_mark;
 use super::graph_text::{EdgeLine, GraphDocument, GraphLines, GraphTextError, Words};
 
 /// Reads a graph.
 ///
 /// # Errors
-/// [`GraphTextError`] naming the first line that is malformed, has another tag, or is impossible (NaN, information
-/// that is not positive semidefinite, an edge from a vertex to itself, a vertex given twice).
+/// [`GraphTextError`] naming the first line that is malformed, of an unknown kind, a constraint that cannot be used
+/// (landmarks, priors, three dimensions), or impossible (NaN, information that is not positive semidefinite, an edge
+/// from a vertex to itself, a vertex given twice).
 pub fn read_g2o(text: &str) -> Result<GraphDocument, GraphTextError> {
     let mut lines = GraphLines::default();
-    for (index, text) in text.lines().enumerate() {
+    for (index, text) in without_mark(text).lines().enumerate() {
         let line = index + 1;
         let Some((tag, mut words)) = Words::of(line, text) else { continue };
         match tag {
@@ -44,7 +46,7 @@ pub fn read_g2o(text: &str) -> Result<GraphDocument, GraphTextError> {
                     lines.fix(line, word.parse().map_err(|_| problem())?);
                 }
             }
-            other => return Err(GraphTextError::new(line, format!("unknown tag {other:?}"))),
+            other => lines.pass_over(line, other)?,
         }
     }
     lines.into_document()
@@ -105,6 +107,28 @@ mod tests {
     }
 
     #[test]
+    fn lines_that_constrain_nothing_are_passed_over_and_counted() {
+        let data = "PARAMS_SE2OFFSET 0 0 0 0\nVERTEX_TAG 3\nVERTEX_TAG 7\nROBOTLASER1 0 -1 2\n\
+            DATA_FEATURE_POINTXY 1 2\nLASER_ROBOT_DATA 1\n";
+        let document = read_g2o(&format!("\u{feff}{data}{}", TEXT.replace('\n', "\r\n"))).unwrap();
+        assert_eq!(document.graph, read_g2o(TEXT).unwrap().graph);
+        assert_eq!((document.passed_over["VERTEX_TAG"], document.passed_over.len()), (2, 5));
+    }
+
+    #[test]
+    fn odometry_is_what_chains_the_vertices_whatever_their_names() {
+        use crate::pose_graph::Trust::{Doubtful, Trusted};
+        // Drive 0 1 2 3, closure 0 3, under four ways to name the poses.
+        for names in [[0, 1, 2, 3], [0, 10, 20, 30], [5, 6, 9, 100], [40, 2, 17, 3]] {
+            let vertices: String = names.iter().map(|id| format!("VERTEX_SE2 {id} 0 0 0\n")).collect();
+            let edge = |i: usize, j: usize| format!("EDGE_SE2 {} {} 1 0 0 1 0 0 1 0 1\n", names[i], names[j]);
+            let text = vertices + &edge(0, 3) + &edge(1, 2) + &edge(1, 0) + &edge(2, 3);
+            let document = read_g2o(&text).unwrap();
+            assert_eq!(document.graph.trusts(), [Doubtful, Trusted, Trusted, Trusted], "{names:?}");
+        }
+    }
+
+    #[test]
     fn chains_edges_where_vertices_are_missing() {
         let text = "EDGE_SE2 0 1 1 0 1.5707963267948966 1 0 0 1 0 1\nEDGE_SE2 1 2 1 0 0 1 0 0 1 0 1\n";
         let document = read_g2o(text).unwrap();
@@ -125,7 +149,14 @@ mod tests {
             ("EDGE_SE2 0 1 1 0 0 1 5 0 1 0 1", 1, "semidefinite"),
             ("EDGE_SE2 0 1 1 0 0 1 0 0 1 0", 1, "information is missing"),
             ("FIX 4", 1, "unknown"),
-            ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1", 1, "unknown tag"),
+            ("VERTEX_SE3:QUAT 0 0 0 0 0 0 0 1", 1, "three dimensions are not supported"),
+            ("EDGE_SE3:QUAT 0 1 0 0 0", 1, "three dimensions are not supported"),
+            ("VERTEX_XY 4 1 2", 1, "landmarks are not supported"),
+            ("EDGE_SE2_XY 0 4 1 2 1 0 1", 1, "landmarks are not supported"),
+            ("EDGE_PRIOR_SE2 0 1 2 3 1 0 0 1 0 1", 1, "priors on poses are not supported"),
+            ("EDGE_SE2_SWITCHABLE 0 1 2", 1, "switches of their own"),
+            ("EDGE_SE2_OFFSET 0 1 2", 1, "of this kind are not supported"),
+            ("WALL 0 1 2", 1, "unknown tag"),
         ];
         for (text, line, problem) in cases {
             let error = read_g2o(text).unwrap_err();

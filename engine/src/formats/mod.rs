@@ -4,6 +4,7 @@ mod carmen;
 mod carmen_writer;
 mod decimal_time;
 mod fields;
+mod flaser_beams;
 mod labels;
 mod map_server;
 mod relations;
@@ -16,8 +17,11 @@ pub use carmen_writer::{carmen_header, carmen_scan_lines};
 pub use decimal_time::{format_seconds, parse_seconds_ns};
 use fields::Fields;
 pub use fields::FormatError;
+pub use flaser_beams::BeamAngles;
 pub use labels::{LabeledPlaces, LabeledRegion};
-pub use map_server::{GrayImage, MapServerYaml, parse_map_server_yaml, parse_pgm, write_pgm};
+pub use map_server::{
+    GrayImage, MapMode, MapPicture, MapServerYaml, parse_map_server_yaml, parse_pgm, write_pgm,
+};
 pub use relations::{Relation, parse_relations};
 pub use truth::{TruthPose, parse_truth, truth_text};
 mod g2o;

@@ -7,22 +7,24 @@
 //! ```
 //!
 //! The information comes in another order than in g2o. An `EQUIV` line says that two vertices are the same place; as
-//! TORO's own optimiser does not constrain them, it is read over.
+//! TORO's own optimiser does not constrain them, it is passed over like lines of scans.
 
 use std::fmt::Write as _;
 
 use nalgebra::Matrix3;
 
+use super::fields::without_mark;
 use super::graph_text::{EdgeLine, GraphDocument, GraphLines, GraphTextError, Words};
 
 /// Reads a graph; `VERTEX` and `EDGE` are older names of `VERTEX2` and `EDGE2`.
 ///
 /// # Errors
-/// [`GraphTextError`] naming the first line that is malformed, has another tag, or is impossible (NaN, information
-/// that is not positive semidefinite, an edge from a vertex to itself, a vertex given twice).
+/// [`GraphTextError`] naming the first line that is malformed, of an unknown kind, a constraint that cannot be used
+/// (landmarks, priors, three dimensions), or impossible (NaN, information that is not positive semidefinite, an edge
+/// from a vertex to itself, a vertex given twice).
 pub fn read_toro(text: &str) -> Result<GraphDocument, GraphTextError> {
     let mut lines = GraphLines::default();
-    for (index, text) in text.lines().enumerate() {
+    for (index, text) in without_mark(text).lines().enumerate() {
         let line = index + 1;
         let Some((tag, mut words)) = Words::of(line, text) else { continue };
         match tag {
@@ -39,12 +41,7 @@ pub fn read_toro(text: &str) -> Result<GraphDocument, GraphTextError> {
                 let information = Matrix3::new(xx, xy, xt, xy, yy, yt, xt, yt, tt);
                 lines.add_edge(EdgeLine { line, i, j, i_from_j, information });
             }
-            "EQUIV" => {
-                words.id("first id")?;
-                words.id("second id")?;
-                words.end()?;
-            }
-            other => return Err(GraphTextError::new(line, format!("unknown tag {other:?}"))),
+            other => lines.pass_over(line, other)?,
         }
     }
     lines.into_document()
@@ -94,13 +91,24 @@ mod tests {
     #[test]
     fn writes_what_it_read() {
         let document = read_toro(TEXT).unwrap();
-        assert_eq!(read_toro(&write_toro(&document)).unwrap(), document);
+        let written = read_toro(&write_toro(&document)).unwrap();
+        assert_eq!((written.graph, written.ids), (document.graph, document.ids));
+        assert_eq!(document.passed_over["EQUIV"], 1);
     }
 
     #[test]
     fn errors_name_the_line() {
         let error = read_toro("VERTEX2 0 0 0 0\nEDGE2 0 1 1 0 0.5 10 1 20 30 2 oops\n").unwrap_err();
         assert_eq!((error.line, error.problem.contains("oops")), (2, true));
-        assert_eq!(read_toro("VERTEX3 0 0 0 0").unwrap_err().line, 1);
+        assert!(read_toro("VERTEX3 0 0 0 0").unwrap_err().problem.contains("three dimensions"));
+    }
+
+    #[test]
+    fn scans_beside_the_vertices_are_passed_over() {
+        let laser = "ROBOTLASER1 0 -1.5 3.1 1.5 30 0.1 0 3 1 2 3 0 0 0 0 0 0 0 0 0 0 0 0 1 h 1";
+        let text = TEXT.replace("EDGE2", &format!("{laser}\nEDGE2"));
+        let document = read_toro(&text).unwrap();
+        assert_eq!(document.graph, read_toro(TEXT).unwrap().graph);
+        assert_eq!(document.passed_over["ROBOTLASER1"], 1);
     }
 }

@@ -10,7 +10,7 @@ use crate::geometry::Pose2;
 /// Why the optimisation ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum StopReason {
-    /// χ² changed by less than `relative_gain_min`.
+    /// χ² changed by less than `relative_gain_min`, or is zero but for rounding.
     Converged,
     /// `max_iterations` linear solves were made.
     MaxIterations,
@@ -121,6 +121,15 @@ impl<'a> Problem<'a> {
         self.constraints.iter().map(|constraint| constraint.chi2(&self.poses))
     }
 
+    /// χ² below which nothing but rounding is left at the present poses.
+    fn chi2_of_rounding(&self) -> f64 {
+        let extent_m = self
+            .poses
+            .iter()
+            .fold(0.0_f64, |extent, turned| extent.max(turned.pose.x.abs()).max(turned.pose.y.abs()));
+        self.constraints.iter().map(|constraint| constraint.chi2_of_rounding(extent_m)).sum()
+    }
+
     pub fn into_poses(self) -> Vec<Pose2> {
         self.poses.into_iter().map(|turned| turned.pose).collect()
     }
@@ -174,6 +183,7 @@ impl<'a> Problem<'a> {
     fn run_gauss_newton(&mut self, config: &PoseGraphConfig) -> Result<(u32, StopReason), PoseGraphError> {
         let mut chi2 = self.chi2();
         let (mut best, mut best_chi2) = (self.poses.clone(), chi2);
+        let chi2_of_rounding = self.chi2_of_rounding();
         for iteration in 1..=config.max_iterations {
             self.step(0.0)?;
             let previous = std::mem::replace(&mut chi2, self.chi2());
@@ -181,7 +191,8 @@ impl<'a> Problem<'a> {
                 best_chi2 = chi2;
                 best.clone_from(&self.poses);
             }
-            if is_converged(previous, chi2, config) && chi2 <= best_chi2 * (1.0 + config.relative_gain_min) {
+            let is_best = chi2 <= best_chi2 * (1.0 + config.relative_gain_min);
+            if chi2 <= chi2_of_rounding || is_converged(previous, chi2, config) && is_best {
                 return Ok((iteration, StopReason::Converged));
             }
             if !chi2.is_finite() || chi2 > RUNAWAY_FACTOR * best_chi2.max(1.0) {
@@ -199,6 +210,7 @@ impl<'a> Problem<'a> {
         num_solves: u32,
     ) -> Result<(u32, StopReason), PoseGraphError> {
         let mut chi2 = self.chi2();
+        let chi2_of_rounding = self.chi2_of_rounding();
         let mut damping = DAMPING_START;
         for iteration in num_solves + 1..=config.max_iterations.max(num_solves + 1) {
             let before = self.poses.clone();
@@ -211,7 +223,7 @@ impl<'a> Problem<'a> {
             if is_accepted {
                 let previous = std::mem::replace(&mut chi2, self.chi2());
                 damping /= DAMPING_FACTOR;
-                if is_converged(previous, chi2, config) {
+                if chi2 <= chi2_of_rounding || is_converged(previous, chi2, config) {
                     return Ok((iteration, StopReason::Converged));
                 }
             } else {
@@ -270,7 +282,7 @@ impl<'a> Problem<'a> {
 const RUNAWAY_FACTOR: f64 = 1e6;
 
 fn is_converged(previous: f64, chi2: f64, config: &PoseGraphConfig) -> bool {
-    (previous - chi2).abs() <= config.relative_gain_min * previous || chi2 <= f64::MIN_POSITIVE
+    (previous - chi2).abs() <= config.relative_gain_min * previous
 }
 
 #[cfg(test)]
@@ -395,6 +407,26 @@ mod tests {
         assert!(
             matches!(error, PoseGraphError::Config(ref config) if config.field == "pose_graph.max_iterations")
         );
+    }
+
+    #[test]
+    fn a_graph_without_closures_has_converged_when_only_rounding_is_left() {
+        let mut graph = PoseGraph::new();
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let mut pose = Pose2::identity();
+        graph.add_pose(pose).unwrap();
+        for k in 0..450 {
+            let step = Pose2::new(0.5, 0.0, 0.0).compose(&random_pose(&mut rng, 0.1, 0.3));
+            pose = pose.compose(&step);
+            let rounded = |value: f64| (value * 1e6).round() / 1e6;
+            graph.add_pose(Pose2::new(rounded(pose.x), rounded(pose.y), rounded(pose.theta))).unwrap();
+            graph.add_constraint(constraint(k, k + 1, step, [500.0, 500.0, 5000.0])).unwrap();
+        }
+        for method in [Method::GaussNewton, Method::LevenbergMarquardt] {
+            let report = optimize(&mut graph.clone(), &with(Start::Given, method)).unwrap();
+            assert_eq!(report.stop_reason, StopReason::Converged);
+            assert!(report.iterations <= 8, "{report:?}");
+        }
     }
 
     #[test]

@@ -76,6 +76,15 @@ impl PreparedConstraint {
         (self.information * error).dot(&error)
     }
 
+    /// eᵀ Ω e that rounding alone may leave where the poses reach `extent_m` from the origin.
+    pub fn chi2_of_rounding(&self, extent_m: f64) -> f64 {
+        let z = self.i_from_j.pose;
+        let position = f64::EPSILON * (2.0 * extent_m + z.x.abs() + z.y.abs());
+        let turn = f64::EPSILON * 3.0 * std::f64::consts::PI;
+        let m = &self.information;
+        (m[(0, 0)] + m[(1, 1)]) * position * position + m[(2, 2)] * turn * turn
+    }
+
     /// e in its own axes: metres, metres, radians in (−π, π].
     fn error(&self, x_i: &TurnedPose, x_j: &TurnedPose) -> Vector3<f64> {
         let z = &self.i_from_j;

@@ -7,14 +7,14 @@
 
 use std::collections::BTreeMap;
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Matrix3;
 
 use super::branch_and_bound::{SearchPyramid, SearchWindow};
 use super::config::SubmapConfig;
 use super::evidence_grid::{CellEvidence, EvidenceGrid};
 use super::point_to_line::align;
 use super::points::{thinned_points, transformed};
-use super::register::{Tally, alignment_settings};
+use super::register::{Tally, alignment_settings, window_prior};
 use super::submap::Submap;
 use super::surface_map::SurfaceMap;
 use crate::geometry::{Point2, Pose2};
@@ -227,12 +227,11 @@ impl Area {
         window: &SearchWindow,
         config: &SubmapConfig,
     ) -> Option<AreaFit> {
-        let by_place = 1.0 / (window.half_m * window.half_m).max(0.01);
-        let by_turn = 1.0 / (window.half_turn_rad * window.half_turn_rad).max(1e-4);
-        let prior = Matrix3::from_diagonal(&Vector3::new(by_place, by_place, by_turn));
+        let prior = window_prior(start, window)?;
         let stride = submap.fine_points.len().div_ceil(NUM_ALIGNED_MAX).max(1);
         let points: Vec<Point2> = submap.fine_points.iter().step_by(stride).copied().collect();
-        let found = align(&self.surfaces, &points, start, &prior, start, &alignment_settings(config));
+        let surface_at = |point: &Point2| self.surfaces.surface_at(point, config.min_count);
+        let found = align(surface_at, &points, &prior, start, &alignment_settings(config));
         let pose = found.map_from_points;
         let (corner, pyramid) = self.cut(&pose, config.radius_m + config.spread_half_m);
         let local = Pose2::new(pose.x - corner.x, pose.y - corner.y, pose.theta);

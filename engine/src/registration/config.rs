@@ -113,6 +113,68 @@ impl OdometryNoise {
     }
 }
 
+/// How robots move, whatever their odometry says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct MotionLimits {
+    /// No robot is faster, metres per second.
+    pub speed_max_m_per_s: f64,
+    /// … or turns faster, radians per second.
+    pub turn_speed_max_rad_per_s: f64,
+    /// Odometry may say so much more than that from one scan to the next, metres.
+    pub slack_m: f64,
+    /// … and radians.
+    pub slack_rad: f64,
+    /// Standard deviation of the acceleration, metres per second squared.
+    pub acceleration_m_per_s2: f64,
+    /// The same of the turning speed, radians per second squared.
+    pub turn_acceleration_rad_per_s2: f64,
+    /// Standard deviation of the distance that is always there, metres.
+    pub floor_m: f64,
+    /// … and of the heading, radians.
+    pub floor_rad: f64,
+}
+
+impl Default for MotionLimits {
+    fn default() -> Self {
+        Self {
+            speed_max_m_per_s: 3.0,
+            turn_speed_max_rad_per_s: 3.0,
+            slack_m: 0.3,
+            slack_rad: 0.3,
+            acceleration_m_per_s2: 1.0,
+            turn_acceleration_rad_per_s2: 2.0,
+            floor_m: 0.02,
+            floor_rad: 0.02,
+        }
+    }
+}
+
+impl MotionLimits {
+    /// Covariance of (x, y, θ) of a robot that goes on as it did for some time, in its own axes.
+    pub fn covariance(&self, gap_s: f64) -> Matrix3<f64> {
+        let within =
+            |acceleration: f64, speed_max: f64| (acceleration * gap_s * gap_s).min(speed_max * gap_s);
+        let ahead_sd = self.floor_m + within(self.acceleration_m_per_s2, self.speed_max_m_per_s);
+        let aside_sd = self.floor_m + 0.3 * within(self.acceleration_m_per_s2, self.speed_max_m_per_s);
+        let turn_sd =
+            self.floor_rad + within(self.turn_acceleration_rad_per_s2, self.turn_speed_max_rad_per_s);
+        Matrix3::from_diagonal(&nalgebra::Vector3::new(
+            ahead_sd * ahead_sd,
+            aside_sd * aside_sd,
+            turn_sd * turn_sd,
+        ))
+    }
+
+    /// True when a robot can have made this step within some time; without a clock, of which the usual interval is 0,
+    /// all steps are.
+    pub fn is_possible(&self, step: &Pose2, gap_s: f64, usual_s: f64) -> bool {
+        usual_s <= 0.0
+            || (step.x.hypot(step.y) <= self.slack_m + self.speed_max_m_per_s * gap_s
+                && step.theta.abs() <= self.slack_rad + self.turn_speed_max_rad_per_s * gap_s)
+    }
+}
+
 /// Points of the refiner's window are kept with 16 bits a coordinate, 2 mm each.
 const RANGE_LIMIT_MAX_M: f64 = 65.0;
 
@@ -158,12 +220,28 @@ pub struct RefinerConfig {
     pub search_half_m: f64,
     /// Half width of the correlative search, radians.
     pub search_half_turn_rad: f64,
+    /// The same when odometry is not believed.
+    pub lost_half_turn_rad: f64,
     /// Cell of the correlative search, metres.
     pub search_cell_m: f64,
     /// Returns within this distance take part in the correlative search, metres.
     pub search_radius_m: f64,
     /// Prior of the motion.
     pub odometry: OdometryNoise,
+    /// What is possible without odometry.
+    pub motion: MotionLimits,
+    /// Returns of a scan between keyframes that are asked whether odometry is right.
+    pub num_check_points: usize,
+    /// A scan between keyframes is registered when that would reduce its squared deviations by more.
+    pub check_chi2: f64,
+    /// … or when fewer returns than this share of what is usual lie on surfaces.
+    pub check_share: f64,
+    /// A fit with squared deviations from odometry below this needs no rival.
+    pub sound_chi2: f64,
+    /// Probability that odometry begins to lie from one registered scan to the next.
+    pub lie_probability: f64,
+    /// Probability that it stops to.
+    pub recovery_probability: f64,
 }
 
 impl Default for RefinerConfig {
@@ -188,9 +266,17 @@ impl Default for RefinerConfig {
             min_search_gain: 0.1,
             search_half_m: 0.4,
             search_half_turn_rad: 0.2,
+            lost_half_turn_rad: 0.6,
             search_cell_m: 0.1,
             search_radius_m: 20.0,
             odometry: OdometryNoise::default(),
+            motion: MotionLimits::default(),
+            num_check_points: 36,
+            check_chi2: 12.0,
+            check_share: 0.7,
+            sound_chi2: 12.0,
+            lie_probability: 0.001,
+            recovery_probability: 0.1,
         }
     }
 }
@@ -240,11 +326,29 @@ impl RefinerConfig {
             ("correlated_returns", self.correlated_returns),
             ("search_cell_m", self.search_cell_m),
             ("search_radius_m", self.search_radius_m),
+            ("check_chi2", self.check_chi2),
+            ("sound_chi2", self.sound_chi2),
+            ("motion.speed_max_m_per_s", self.motion.speed_max_m_per_s),
+            ("motion.turn_speed_max_rad_per_s", self.motion.turn_speed_max_rad_per_s),
+            ("motion.acceleration_m_per_s2", self.motion.acceleration_m_per_s2),
+            ("motion.turn_acceleration_rad_per_s2", self.motion.turn_acceleration_rad_per_s2),
+            ("motion.floor_m", self.motion.floor_m),
+            ("motion.floor_rad", self.motion.floor_rad),
         ];
         for (field, value) in positive {
             if !(value.is_finite() && value > 0.0) {
                 return Err(ConfigError::new(format!("{path}.{field}"), "must be a positive number"));
             }
+        }
+        for (field, value) in
+            [("lie_probability", self.lie_probability), ("recovery_probability", self.recovery_probability)]
+        {
+            if !(value > 0.0 && value < 1.0) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must lie between 0 and 1"));
+            }
+        }
+        if self.num_check_points == 0 {
+            return Err(ConfigError::new(format!("{path}.num_check_points"), "must be positive"));
         }
         if self.range_limit_m > RANGE_LIMIT_MAX_M {
             let problem = format!("must be at most {RANGE_LIMIT_MAX_M}");

@@ -2,8 +2,9 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::surface_map::SurfaceMap;
-use crate::geometry::{Point2, Pose2, wrap_angle};
+use super::motion_prior::MotionPrior;
+use super::surface_map::Surface;
+use crate::geometry::{Point2, Pose2};
 
 /// How points are pulled onto surfaces.
 #[derive(Clone, Copy, Debug)]
@@ -14,8 +15,6 @@ pub(crate) struct AlignmentSettings {
     pub outlier_m: f64,
     /// The same at the first step, metres.
     pub first_outlier_m: f64,
-    /// Points that a surface must rest on.
-    pub min_count: i32,
     /// Steps at most.
     pub max_iterations: usize,
     /// Neighbouring returns err together: this many count as one independent measurement.
@@ -39,76 +38,91 @@ pub(crate) struct Alignment {
     pub information: Matrix3<f64>,
     /// Share of all points that lie on a surface.
     pub inlier_share: f64,
+    /// Negative logarithm of the probability of points and prior together, up to a constant that all poses share.
+    pub cost: f64,
 }
 
-/// Moves `points` from `start` onto the surfaces of `map`.
+/// Moves `points` from `start` onto the surfaces of a map; `surface_at` looks them up.
 ///
-/// Minimises Σ ρ(nᵀ(T p − μ)) / noise² + (T ⊖ start)ᵀ `prior` (T ⊖ start) with the Geman-McClure ρ, whose weight
-/// falls with the square of the distance, so that people and open doors stop to pull.
+/// Minimises Σ ρ(nᵀ(T p − μ)) / noise² − 2 log prior(T) with the Geman-McClure ρ, whose weight falls with the square of
+/// the distance, so that people and open doors stop to pull.
 pub(crate) fn align(
-    map: &SurfaceMap,
+    mut surface_at: impl FnMut(&Point2) -> Option<Surface>,
     points: &[Point2],
-    prior_mean: &Pose2,
-    prior: &Matrix3<f64>,
+    prior: &MotionPrior,
     start: &Pose2,
     settings: &AlignmentSettings,
 ) -> Alignment {
     let mut pose = *start;
-    let mut result = Alignment { map_from_points: pose, information: *prior, inlier_share: 0.0 };
-    for iteration in 0..=settings.max_iterations {
+    let mut iteration = 0;
+    loop {
         let outlier_m = settings.outlier_at(iteration);
-        let (hessian, gradient, num_inliers) = linearize(map, points, &pose, settings, outlier_m);
-        let offset = Vector3::new(
-            pose.x - prior_mean.x,
-            pose.y - prior_mean.y,
-            wrap_angle(pose.theta - prior_mean.theta),
-        );
-        let information = hessian + prior;
-        result = Alignment {
+        let fit = linearize(&mut surface_at, points, &pose, settings, outlier_m);
+        let (prior_information, prior_gradient) = prior.pull(&pose);
+        let information = fit.hessian + prior_information;
+        let mut result = Alignment {
             map_from_points: pose,
             information,
-            inlier_share: f64::from(num_inliers) / points.len().max(1) as f64,
+            inlier_share: f64::from(fit.num_inliers) / points.len().max(1) as f64,
+            cost: fit.cost + prior.cost(&pose),
         };
-        if iteration == settings.max_iterations {
-            break;
-        }
-        let Some(factor) = information.cholesky() else { break };
-        let step = factor.solve(&-(gradient + prior * offset));
+        let factor = information.cholesky().filter(|_| iteration < settings.max_iterations);
+        let Some(factor) = factor else { return result };
+        let step = factor.solve(&-(fit.gradient + prior_gradient));
         pose = Pose2::new(pose.x + step.x, pose.y + step.y, pose.theta + step.z);
         let is_annealed = outlier_m <= settings.outlier_m;
         if is_annealed && step.x.abs() < 2e-4 && step.y.abs() < 2e-4 && step.z.abs() < 2e-5 {
             result.map_from_points = pose;
-            break;
+            return result;
         }
+        iteration += 1;
     }
-    result
 }
 
-fn linearize(
-    map: &SurfaceMap,
+/// Points against surfaces at one pose.
+pub(crate) struct Linearization {
+    /// Information of the points about (x, y, θ).
+    pub hessian: Matrix3<f64>,
+    /// Gradient of the cost.
+    pub gradient: Vector3<f64>,
+    /// Points that lie on a surface.
+    pub num_inliers: u32,
+    /// Half the sum of the weighed squares; a point without a surface costs half of what a far one does.
+    pub cost: f64,
+}
+
+/// What points say of a pose, to first order.
+pub(crate) fn linearize(
+    mut surface_at: impl FnMut(&Point2) -> Option<Surface>,
     points: &[Point2],
     pose: &Pose2,
     settings: &AlignmentSettings,
     outlier_m: f64,
-) -> (Matrix3<f64>, Vector3<f64>, u32) {
+) -> Linearization {
     let (sin, cos) = pose.theta.sin_cos();
     let mut h = [0.0f64; 6];
     let mut g = [0.0f64; 3];
     let mut num_inliers = 0;
+    let mut cost = 0.0;
     let outlier2 = outlier_m * outlier_m;
+    let noise2 = settings.noise_m * settings.noise_m;
+    let unseen_cost = 0.25 * outlier2 / (noise2 * settings.correlated_returns);
     for point in points {
         let (rx, ry) = (cos * point.x - sin * point.y, sin * point.x + cos * point.y);
         let placed = Point2::new(pose.x + rx, pose.y + ry);
-        let Some(surface) = map.surface_at(&placed, settings.min_count) else { continue };
+        let Some(surface) = surface_at(&placed) else {
+            cost += unseen_cost;
+            continue;
+        };
         let n = surface.normal;
         let residual = n.x * (placed.x - surface.mean.x) + n.y * (placed.y - surface.mean.y);
         if residual.abs() < settings.outlier_m {
             num_inliers += 1;
         }
         let falloff = outlier2 / (outlier2 + residual * residual);
-        let variance = settings.noise_m * settings.noise_m + surface.across_m2;
-        let flatness = 1.0 - surface.across_m2 / surface.along_m2.max(1e-9);
-        let weight = flatness * falloff * falloff / (variance * settings.correlated_returns);
+        let strength = surface.flatness / ((noise2 + surface.across_m2) * settings.correlated_returns);
+        cost += 0.5 * strength * residual * residual * falloff;
+        let weight = strength * falloff * falloff;
         let turn = -n.x * ry + n.y * rx;
         h[0] += weight * n.x * n.x;
         h[1] += weight * n.x * n.y;
@@ -120,9 +134,10 @@ fn linearize(
         g[1] += weight * n.y * residual;
         g[2] += weight * turn * residual;
     }
-    (
-        Matrix3::new(h[0], h[1], h[2], h[1], h[3], h[4], h[2], h[4], h[5]),
-        Vector3::new(g[0], g[1], g[2]),
+    Linearization {
+        hessian: Matrix3::new(h[0], h[1], h[2], h[1], h[3], h[4], h[2], h[4], h[5]),
+        gradient: Vector3::new(g[0], g[1], g[2]),
         num_inliers,
-    )
+        cost,
+    }
 }

@@ -5,6 +5,7 @@ use nalgebra::Matrix3;
 use super::branch_and_bound::SearchWindow;
 use super::config::SubmapConfig;
 use super::evidence_grid::{CellEvidence, EvidenceGrid};
+use super::motion_prior::{MotionPrior, Witness};
 use super::point_to_line::{AlignmentSettings, align};
 use super::submap::Submap;
 use crate::geometry::{Point2, Pose2};
@@ -46,10 +47,9 @@ pub fn refine_from(
     config: &SubmapConfig,
 ) -> Option<SubmapFit> {
     let settings = alignment_settings(config);
-    let by_place = 1.0 / (window.half_m * window.half_m).max(0.01);
-    let by_turn = 1.0 / (window.half_turn_rad * window.half_turn_rad).max(1e-4);
-    let prior = Matrix3::from_diagonal(&nalgebra::Vector3::new(by_place, by_place, by_turn));
-    let alignment = align(&earlier.surfaces, &later.fine_points, start, &prior, start, &settings);
+    let prior = window_prior(start, window)?;
+    let surface_at = |point: &Point2| earlier.surfaces.surface_at(point, config.min_count);
+    let alignment = align(surface_at, &later.fine_points, &prior, start, &settings);
     let pose = alignment.map_from_points;
     let opinions = Opinions::of(earlier, later, &pose).all();
     let num_opinions = opinions.num_confirmed + opinions.num_contradicted;
@@ -74,13 +74,20 @@ pub fn refine_from(
     })
 }
 
+/// A pose is somewhere in the window around the start.
+pub(super) fn window_prior(start: &Pose2, window: &SearchWindow) -> Option<MotionPrior> {
+    let place = (window.half_m * window.half_m).max(0.01);
+    let turn = (window.half_turn_rad * window.half_turn_rad).max(1e-4);
+    let covariance = Matrix3::from_diagonal(&nalgebra::Vector3::new(place, place, turn));
+    Some(MotionPrior::new(Witness::new(*start, &covariance, 1.0)?, []))
+}
+
 /// How returns are pulled onto surfaces.
 pub(super) fn alignment_settings(config: &SubmapConfig) -> AlignmentSettings {
     AlignmentSettings {
         noise_m: config.noise_m,
         outlier_m: config.outlier_m,
         first_outlier_m: config.first_outlier_m,
-        min_count: config.min_count,
         max_iterations: config.max_iterations,
         correlated_returns: config.correlated_returns,
     }

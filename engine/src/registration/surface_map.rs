@@ -61,8 +61,26 @@ pub(crate) struct Surface {
     pub normal: Point2,
     /// Variance of the points across the surface, square metres.
     pub across_m2: f64,
-    /// Variance along it, square metres.
-    pub along_m2: f64,
+    /// How much the points lie along a line: 1 on a straight wall, 0 in a round heap.
+    pub flatness: f64,
+}
+
+/// Surfaces of a map that does not change while they are kept: a line is fitted once, however often it is asked for.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FittedSurfaces {
+    fits: HashMap<CellKey, Option<Surface>, BuildHasherDefault<CellHasher>>,
+}
+
+impl FittedSurfaces {
+    /// [`SurfaceMap::surface_at`] of the map, remembered.
+    pub fn surface_at(&mut self, map: &SurfaceMap, point: &Point2, min_count: i32) -> Option<Surface> {
+        *self.fits.entry(key(map.cell_of(point))).or_insert_with(|| map.surface_at(point, min_count))
+    }
+
+    /// Forgets what was fitted, because the map has changed.
+    pub fn clear(&mut self) {
+        self.fits.clear();
+    }
 }
 
 /// Moments of points per cell.
@@ -145,11 +163,12 @@ impl SurfaceMap {
         let (sin, cos) = along.sin_cos();
         let center_x = (f64::from(column) + 0.5) * self.cell_m;
         let center_y = (f64::from(row) + 0.5) * self.cell_m;
+        let (across_m2, along_m2) = ((half_sum - half_gap).max(0.0) * 1e-6, (half_sum + half_gap) * 1e-6);
         Some(Surface {
             mean: Point2::new(center_x + mx * 1e-3, center_y + my * 1e-3),
             normal: Point2::new(-sin, cos),
-            across_m2: (half_sum - half_gap).max(0.0) * 1e-6,
-            along_m2: (half_sum + half_gap) * 1e-6,
+            across_m2,
+            flatness: 1.0 - across_m2 / along_m2.max(1e-9),
         })
     }
 

@@ -40,7 +40,7 @@ impl PlaceSampler {
 
     /// Moves on to the pose of the next scan. `here.travel_m` is ignored: travel is counted here.
     ///
-    /// Steps below `standstill_m` are collected until they make one, so that a standing robot's jitter is no travel.
+    /// Travel is that of the robot, not what odometry says of it. Steps below `standstill_m` are collected until they make one, so that a standing robot's jitter is no travel.
     /// Nothing is observed along a jump; the place behind it is.
     pub fn drive(&mut self, mut here: Place) {
         let Some(latest) = &self.latest else {
@@ -50,7 +50,7 @@ impl PlaceSampler {
             self.latest = Some(here);
             return;
         };
-        let step = latest.odom_from_robot.distance(&here.odom_from_robot);
+        let step = latest.run_from_robot.distance(&here.run_from_robot);
         if !step.is_finite() || step < self.config.standstill_m {
             return;
         }

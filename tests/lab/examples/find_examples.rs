@@ -5,7 +5,6 @@
 //! were: nowhere. `intel/2-1` is the first half of a recording. Weights are fitted to the pairs marked `fit=`.
 //! An argument that begins with a brace is the configuration; `length=12` is the driven length.
 
-use std::io::Read;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -159,10 +158,7 @@ fn read_text(name: &str, ending: &str) -> Result<String, Failure> {
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/datasets"),
         PathBuf::from,
     );
-    let file = std::fs::File::open(datasets.join("laser").join(format!("{name}.{ending}.gz")))?;
-    let mut bytes = Vec::new();
-    flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes)?;
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    Ok(locution_lab::recordings::read_text(&datasets.join("laser").join(format!("{name}.{ending}.gz")))?)
 }
 
 /// Maps a part and prepares it for questions.

@@ -6,8 +6,7 @@
 //! that begins with a brace is the configuration: `'{"mapping":{"max_rounds":3}}'`.
 
 use std::collections::BTreeMap;
-use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use locution_engine::config::EngineConfig;
@@ -76,10 +75,7 @@ fn read_text(folder: &str, name: &str, ending: &str) -> Option<String> {
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/datasets"),
         PathBuf::from,
     );
-    let path: &Path = &datasets.join(folder).join(format!("{name}.{ending}.gz"));
-    let mut bytes = Vec::new();
-    flate2::read::MultiGzDecoder::new(std::fs::File::open(path).ok()?).read_to_end(&mut bytes).ok()?;
-    Some(String::from_utf8_lossy(&bytes).into_owned())
+    locution_lab::recordings::read_text(&datasets.join(folder).join(format!("{name}.{ending}.gz"))).ok()
 }
 
 /// A recording cut into consecutive robots, each with an odometry frame of its own.

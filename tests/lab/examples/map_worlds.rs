@@ -10,7 +10,6 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use locution_engine::config::EngineConfig;
-use locution_engine::formats::{GrayImage, parse_map_server_yaml};
 use locution_engine::geometry::{Point2, Pose2, wrap_angle};
 use locution_engine::mapping::{
     Change, ChangesConfig, Keyframe, PlacedRun, RegistrationMemo, RunRecord, SiteMap, find_changes, map_site,
@@ -136,17 +135,7 @@ fn read_world(name: &str) -> Result<World, Failure> {
             PathBuf::from,
         )
         .join("worlds");
-    let yaml = parse_map_server_yaml(&std::fs::read_to_string(folder.join(format!("{name}.yaml")))?)?;
-    let mut decoder =
-        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join(&yaml.image))?));
-    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
-    let mut reader = decoder.read_info()?;
-    let mut pixels = vec![0; reader.output_buffer_size().ok_or("the picture is too large")?];
-    let frame = reader.next_frame(&mut pixels)?;
-    let samples = frame.color_type.samples();
-    let pixels = pixels[..frame.buffer_size()].iter().step_by(samples).copied().collect();
-    let image = GrayImage { width: frame.width as usize, height: frame.height as usize, pixels };
-    Ok(World::from_map_server(&image, &yaml)?)
+    Ok(locution_lab::worlds::read_world(&folder.join(format!("{name}.yaml")))?)
 }
 
 fn mapped(runs: &[Driven]) -> Result<SiteMap, Failure> {

@@ -22,4 +22,5 @@ pub mod small_building;
 mod stroke_font;
 pub mod thesis;
 mod turns;
+mod unpacked;
 pub mod worlds;

@@ -1,14 +1,14 @@
 //! Recordings from files: CARMEN logs and what goes with them, plain or gzipped.
 
-use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{BufRead, Read};
 use std::path::Path;
 
-use anyhow::{Context, Result};
-use flate2::bufread::MultiGzDecoder;
+use anyhow::{Context, Result, anyhow};
 use locution_engine::formats::{
-    CarmenLog, CarmenOptions, CarmenReader, Relation, TruthPose, parse_relations, parse_truth,
+    CarmenLog, CarmenOptions, CarmenReader, FormatError, Relation, TruthPose, parse_relations, parse_truth,
 };
+
+use super::unpacked::{is_damage, open_unpacked};
 
 /// A log and the name its run gets.
 #[derive(Clone, Debug)]
@@ -19,22 +19,37 @@ pub struct Recording {
     pub log: CarmenLog,
 }
 
-/// Reads a CARMEN log.
+/// Reads a CARMEN log. Where the options pass over malformed lines, a packed file that is cut off or damaged is read
+/// as far as it goes.
 ///
 /// # Errors
 /// A file that cannot be read, or a line that cannot be understood, with its number.
 pub fn read_recording(path: &Path, options: CarmenOptions) -> Result<Recording> {
     let mut reader = CarmenReader::new(options);
-    let mut input = open(path)?;
+    let mut input = open_unpacked(path)?;
     let mut line = Vec::new();
     let in_file = || path.display().to_string();
-    while input.read_until(b'\n', &mut line).with_context(in_file)? > 0 {
+    let (mut num_lines, mut damage) = (0, None);
+    while damage.is_none() {
+        match input.read_until(b'\n', &mut line) {
+            Ok(0) => break,
+            Ok(_) => {}
+            Err(error) if is_damage(&error) && options.skip_malformed => damage = Some(error),
+            Err(error) if is_damage(&error) => {
+                let hint = anyhow!("{error}; --skip-malformed takes what comes before");
+                return Err(hint).with_context(in_file);
+            }
+            Err(error) => return Err(error).with_context(in_file),
+        }
+        num_lines += 1;
         // Old logs have host names and comments in all sorts of encodings; numbers are plain everywhere.
         let text = String::from_utf8_lossy(&line);
         reader.push_line(text.trim_end_matches(['\n', '\r'])).with_context(in_file)?;
         line.clear();
     }
-    Ok(Recording { name: run_name(path), log: reader.finish().with_context(in_file)? })
+    let mut log = reader.finish().with_context(in_file)?;
+    log.skipped.extend(damage.map(|error| FormatError::new(num_lines, error.to_string())));
+    Ok(Recording { name: run_name(path), log })
 }
 
 /// Reads true poses.
@@ -53,26 +68,15 @@ pub fn read_relations(path: &Path) -> Result<Vec<Relation>> {
     parse_relations(&read_text(path)?).with_context(|| path.display().to_string())
 }
 
-/// A whole text file, plain or gzipped.
+/// A whole text file, plain or gzipped. What is not UTF-8, as in the comments of old files, is replaced.
 ///
 /// # Errors
-/// A file that cannot be read or is not UTF-8.
+/// A file that cannot be read.
 pub fn read_text(path: &Path) -> Result<String> {
-    let mut text = String::new();
-    open(path)?.read_to_string(&mut text).with_context(|| path.display().to_string())?;
-    Ok(text)
-}
-
-/// Gzip is recognised by its first two bytes, whatever the file is called.
-fn open(path: &Path) -> Result<Box<dyn BufRead>> {
-    let file = File::open(path).with_context(|| format!("cannot open {}", path.display()))?;
-    let mut plain = BufReader::with_capacity(1 << 16, file);
-    let is_gzip = plain.fill_buf().with_context(|| path.display().to_string())?.starts_with(&[0x1f, 0x8b]);
-    Ok(if is_gzip {
-        Box::new(BufReader::with_capacity(1 << 16, MultiGzDecoder::new(plain)))
-    } else {
-        Box::new(plain)
-    })
+    let mut bytes = Vec::new();
+    open_unpacked(path)?.read_to_end(&mut bytes).with_context(|| path.display().to_string())?;
+    Ok(String::from_utf8(bytes)
+        .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned()))
 }
 
 fn run_name(path: &Path) -> String {
@@ -87,7 +91,56 @@ fn run_name(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
+    use std::io::Write;
+
     use super::*;
+
+    /// Five scans, packed.
+    fn packed_log() -> Vec<u8> {
+        let line = |time: usize| {
+            let readings: Vec<String> = (0..181)
+                .map(|beam| format!("{:.3}", 1.0 + ((beam * 7919 + time * 104_729) % 9973) as f64 * 1e-3))
+                .collect();
+            format!("FLASER 181 {} 0 0 0 0 0 0 {time}.0 host {time}.0\n", readings.join(" "))
+        };
+        let text: String = (0..5).map(line).collect();
+        let mut packer = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+        packer.write_all(text.as_bytes()).unwrap();
+        packer.finish().unwrap()
+    }
+
+    fn read(bytes: &[u8], skip_malformed: bool) -> Result<Recording> {
+        let mut file = tempfile::NamedTempFile::new().unwrap();
+        file.write_all(bytes).unwrap();
+        read_recording(file.path(), CarmenOptions { skip_malformed, ..CarmenOptions::default() })
+    }
+
+    #[test]
+    fn zeros_after_the_end_are_no_error_and_parts_are_read_one_after_the_other() {
+        let packed = packed_log();
+        let padded = [packed.clone(), vec![0; 700]].concat();
+        assert_eq!(read(&padded, false).unwrap().log.scans.len(), 5);
+        let parts = [padded, packed.clone(), packed].concat();
+        assert_eq!(read(&parts, false).unwrap().log.scans.len(), 15);
+    }
+
+    #[test]
+    fn a_file_that_is_cut_off_is_read_as_far_as_it_goes_if_that_is_asked_for() {
+        let mut packed = packed_log();
+        packed.truncate(packed.len() * 3 / 4);
+        let error = format!("{:#}", read(&packed, false).unwrap_err());
+        assert!(error.contains("cut off") && error.contains("--skip-malformed"), "{error}");
+        let log = read(&packed, true).unwrap().log;
+        assert!((2..5).contains(&log.scans.len()), "{}", log.scans.len());
+        assert!(log.skipped.last().unwrap().problem.contains("cut off"), "{:?}", log.skipped);
+    }
+
+    #[test]
+    fn what_follows_the_packed_data_is_told() {
+        let followed = [packed_log(), b"a note".to_vec()].concat();
+        assert!(format!("{:#}", read(&followed, false).unwrap_err()).contains("other bytes"));
+        assert_eq!(read(&followed, true).unwrap().log.scans.len(), 5);
+    }
 
     #[test]
     fn runs_are_named_after_their_files() {

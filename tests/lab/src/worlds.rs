@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::simulation::World;
 use anyhow::{Context, Result, bail};
-use locution_engine::formats::{GrayImage, parse_map_server_yaml, parse_pgm};
+use locution_engine::formats::{GrayImage, MapPicture, parse_map_server_yaml, parse_pgm};
 
 use super::recordings::read_text;
 
@@ -27,9 +27,9 @@ pub fn read_world(yaml_path: &Path) -> Result<World> {
 ///
 /// # Errors
 /// Bytes that are neither PNG nor PGM.
-pub fn decode_picture(bytes: &[u8]) -> Result<GrayImage> {
+pub fn decode_picture(bytes: &[u8]) -> Result<MapPicture> {
     if bytes.starts_with(b"P5") || bytes.starts_with(b"P2") {
-        return Ok(parse_pgm(bytes)?);
+        return Ok(parse_pgm(bytes)?.into());
     }
     if !bytes.starts_with(b"\x89PNG") {
         bail!("neither a PNG nor a PGM picture");
@@ -41,13 +41,15 @@ pub fn decode_picture(bytes: &[u8]) -> Result<GrayImage> {
     let mut buffer = vec![0; num_bytes];
     let frame = reader.next_frame(&mut buffer)?;
     let samples = frame.color_type.samples();
-    // A last sample beside grey or colour is opacity and says nothing about walls.
+    // Grey or three colours, and perhaps a last sample that is the opacity.
     let num_colors = if samples > 2 { 3 } else { 1 };
     let gray = |pixel: &[u8]| {
         (pixel[..num_colors].iter().map(|&value| u32::from(value)).sum::<u32>() / num_colors as u32) as u8
     };
-    let pixels = buffer[..frame.buffer_size()].chunks_exact(samples).map(gray).collect();
-    Ok(GrayImage { width: frame.width as usize, height: frame.height as usize, pixels })
+    let pixels = || buffer[..frame.buffer_size()].chunks_exact(samples);
+    let opacity = (samples > num_colors).then(|| pixels().map(|pixel| pixel[num_colors]).collect());
+    let (width, height) = (frame.width as usize, frame.height as usize);
+    Ok(MapPicture { gray: GrayImage { width, height, pixels: pixels().map(gray).collect() }, opacity })
 }
 
 #[cfg(test)]
@@ -63,7 +65,8 @@ mod tests {
         writer.write_image_data(&[30, 60, 90, 255, 254, 254, 254, 0]).unwrap();
         writer.finish().unwrap();
         let image = decode_picture(&bytes).unwrap();
-        assert_eq!(image, GrayImage { width: 2, height: 1, pixels: vec![60, 254] });
+        assert_eq!(image.gray, GrayImage { width: 2, height: 1, pixels: vec![60, 254] });
+        assert_eq!(image.opacity, Some(vec![255, 0]));
         assert!(decode_picture(b"GIF89a").is_err());
     }
 }

@@ -182,7 +182,7 @@ fn use_cases_records_and_storage_know_no_http() {
     let mut inner = sources("server/src/app");
     inner.extend(sources("server/src/records"));
     inner.extend(sources("server/src/storage"));
-    check(forbid(&inner, &["axum::", "utoipa::", "crate::handlers"]));
+    check(forbid(&inner, &["axum::", "utoipa::", "crate::http"]));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use locution_client::{Client, LabeledStretch};
+use locution_client::{Client, Label};
 use locution_engine::formats::LabeledPlaces;
 use locution_engine::geometry::Pose2;
 use locution_lab::evaluation::{LabelReport, LabeledObservation, judge_labels};
@@ -74,7 +74,7 @@ async fn labeled_run(
     client: &Client,
     sent: &SentRecording,
     (truth_path, labels_path): (&Path, &Path),
-    stretches: &[LabeledStretch],
+    stretches: &[Label],
 ) -> Result<Vec<Labeled>> {
     let name = &sent.recording.name;
     let observations = client.observations(SITE, name).await?;
@@ -94,7 +94,7 @@ async fn labeled_run(
     for stretch in stretches.iter().filter(|stretch| stretch.run == *name) {
         let (first, last) = (usize::try_from(stretch.first)?, usize::try_from(stretch.last)?);
         for observation in labeled.iter_mut().take(last.saturating_add(1)).skip(first) {
-            observation.predicted = Some(stretch.label.clone());
+            observation.predicted = Some(stretch.label.as_str().to_owned());
         }
     }
     Ok(labeled)

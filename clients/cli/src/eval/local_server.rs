@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use indicatif::MultiProgress;
 use locution_client::Client;
 use locution_engine::formats::CarmenOptions;
 
 use crate::replay::Format;
-use crate::upload::{UploadOptions, Uploaded, build_with_progress, progress_bar, upload_recording};
+use crate::upload::{UploadOptions, Uploaded, build_with_progress, open_run, progress_bar, upload_recording};
 use locution_lab::recordings::{Recording, read_recording};
 use locution_server::config::ServerConfig;
 use locution_server::{RunningServer, start_server};
@@ -118,12 +117,14 @@ impl RecordingArguments {
             num_scans_per_batch: self.batch,
             ..UploadOptions::default()
         };
-        let bars = MultiProgress::new();
         let (mut sent, mut bytes_before) = (Vec::new(), server.client.site(SITE).await?.bytes_on_disk);
         for recording in recordings {
-            let bar = progress_bar(&bars, &recording.name, recording.log.scans.len());
-            let names = (SITE, recording.name.as_str(), recording.name.as_str());
-            let uploaded = upload_recording(&server.client, names, &recording.log, &options, &bar).await?;
+            let (name, log) = (recording.name.as_str(), &recording.log);
+            let bar = progress_bar(name, log.scans.len());
+            let upload = open_run(&server.client, (SITE, name, name), log, &options).await?;
+            let uploaded =
+                upload_recording(&server.client, (SITE, name), upload, log, &options, &bar).await?;
+            bar.finish();
             let bytes_after = server.client.site(SITE).await?.bytes_on_disk;
             let bytes_on_disk = bytes_after.saturating_sub(bytes_before);
             bytes_before = bytes_after;

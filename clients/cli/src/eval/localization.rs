@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use locution_client::{Client, LocalizationState, NewRun, Scan};
+use locution_client::{Client, Frame, LocalizationState, NewLocalization, Scan};
 use locution_engine::formats::{CarmenLog, CarmenOptions};
 use locution_engine::geometry::Pose2;
 use locution_lab::evaluation::{
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::local_server::{LocalServer, SITE, build_map};
-use crate::upload::{UploadOptions, progress_bar, upload_recording};
+use crate::upload::{UploadOptions, open_run, progress_bar, upload_recording};
 use crate::wire::{wire_geometry, wire_scan};
 use locution_lab::recordings::{Recording, read_recording, read_truth};
 use locution_lab::report::write_json;
@@ -165,11 +165,13 @@ pub(super) async fn build(
 ) -> Result<Vec<(Pose2, Pose2)>> {
     server.client.put_site(SITE, config).await?;
     let name = map.recording.name.as_str();
-    let bar = progress_bar(&indicatif::MultiProgress::new(), name, map.recording.log.scans.len());
+    let bar = progress_bar(name, map.recording.log.scans.len());
     let options = UploadOptions::default();
-    upload_recording(&server.client, (SITE, name, name), &map.recording.log, &options, &bar).await?;
+    let upload = open_run(&server.client, (SITE, name, name), &map.recording.log, &options).await?;
+    upload_recording(&server.client, (SITE, name), upload, &map.recording.log, &options, &bar).await?;
+    bar.finish();
     build_map(server).await?;
-    let trajectory = server.client.trajectory(SITE, name, "map").await?;
+    let trajectory = server.client.trajectory(SITE, name, Frame::Map, None).await?;
     let pairs = trajectory.poses.iter().filter_map(|pose| {
         let truth = (*map.truth.get(usize::try_from(pose.scan_seq).ok()?)?)?;
         Some((truth, Pose2::new(pose.x, pose.y, pose.theta)))
@@ -199,7 +201,8 @@ async fn trial(
     limit_m: f64,
 ) -> Result<LocalizationTrial> {
     let recording = &log.recording;
-    let robot = NewRun { robot: "evaluation".into(), geometry: wire_geometry(&recording.log.geometry) };
+    let geometry = wire_geometry(&recording.log.geometry);
+    let robot = NewLocalization { robot: Some("evaluation".into()), geometry, prior: None };
     let opened = client.open_localization(SITE, &robot).await.context("a localisation cannot be opened")?;
     let mut next = start;
     let mut answered = None;
@@ -213,7 +216,7 @@ async fn trial(
         let answer = client.localize(SITE, &opened.id, (next - start) as u64, &scans).await?;
         next = end.min(log.travel_m.len() - 1);
         if answer.state == LocalizationState::Converged {
-            answered = answer.hypotheses.first().map(|best| (end - 1, best.pose));
+            answered = answer.hypotheses.first().map(|best| (end - 1, best.map_from_robot));
         }
         if end >= log.travel_m.len() {
             break;

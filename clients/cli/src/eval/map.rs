@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
+use locution_client as wire;
 use locution_engine::geometry::Pose2;
 use locution_lab::evaluation::{EstimatedPose, MapErrorReport, judge_map};
 use serde::Serialize;
@@ -30,6 +31,14 @@ impl Frame {
             Self::Map => "map",
             Self::Run => "run",
             Self::Odom => "odom",
+        }
+    }
+
+    const fn on_the_wire(self) -> wire::Frame {
+        match self {
+            Self::Map => wire::Frame::Map,
+            Self::Run => wire::Frame::Run,
+            Self::Odom => wire::Frame::Odom,
         }
     }
 }
@@ -70,8 +79,9 @@ pub(super) async fn run(arguments: &MapArguments) -> Result<()> {
     let build_seconds = if arguments.frame == Frame::Map { build_map(&server).await? } else { 0.0 };
     let (mut poses, mut relations) = (Vec::new(), Vec::new());
     for (idx, (sent, path)) in sent.iter().zip(&arguments.relations).enumerate() {
-        let trajectory = server.client.trajectory(SITE, &sent.recording.name, arguments.frame.name()).await?;
-        let component = trajectory.component.unwrap_or(idx as u64);
+        let trajectory =
+            server.client.trajectory(SITE, &sent.recording.name, arguments.frame.on_the_wire(), None).await?;
+        let component = trajectory.component.map_or(idx as u64, u64::from);
         poses.extend(trajectory.poses.iter().map(|pose| EstimatedPose {
             timestamp_ns: pose.timestamp_ns,
             component,

@@ -9,6 +9,7 @@ mod localization;
 mod map;
 mod query;
 pub mod recognition;
+mod robust;
 
 /// Prints tables and writes JSON.
 #[derive(Debug, Args)]
@@ -31,6 +32,8 @@ enum What {
     Query(query::QueryArguments),
     /// Robots on maps of their own building, of a part of it, and of others, without a server: ever wrongly sure, found.
     OpenWorld(locution_lab::open_world::OpenWorldArguments),
+    /// Pose graphs with forged closures: how often the optimizer is not misled.
+    Robust(robust::RobustArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
     Thesis(locution_lab::thesis::ThesisArguments),
 }
@@ -49,6 +52,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
             What::OpenWorld(arguments) => locution_lab::open_world::run(arguments),
+            What::Robust(arguments) => robust::run(arguments),
             What::Thesis(arguments) => locution_lab::thesis::run(arguments),
         }
     })

@@ -131,7 +131,11 @@ async fn ask(
     let place = |pose: &locution_client::Pose| Pose2::new(pose.x, pose.y, pose.theta);
     Ok(ExampleTrial {
         expected,
-        answered: answer.places.iter().map(|found| (place(&found.pose), found.probability)).collect(),
+        answered: answer
+            .places
+            .iter()
+            .map(|found| (place(&found.map_from_robot), found.probability))
+            .collect(),
         is_sure: answer.state == LocalizationState::Converged,
         latency_s,
     })

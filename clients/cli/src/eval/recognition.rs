@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use locution_client::{Client, Observation, PlaceMatch, Word};
+use locution_client::{self as wire, Client, Match, MatchFilter, MatchState, Observation, Word};
 use locution_engine::formats::TruthPose;
 use locution_engine::index::Lattice;
 use locution_engine::mapping::Interval;
@@ -88,7 +88,7 @@ pub(super) async fn run(arguments: &RecognitionArguments) -> Result<()> {
         reports.push(recording_report(&server.client, sent).await?);
     }
     let names: Vec<&str> = sent.iter().map(|sent| sent.recording.name.as_str()).collect();
-    let matches = server.client.matches(SITE, "").await?;
+    let matches = server.client.matches(SITE, &MatchFilter::default()).await?;
     let judged: Vec<JudgedMatch> = matches.iter().filter_map(|found| judged_match(found, &names)).collect();
     let report = Report {
         recordings: reports,
@@ -137,25 +137,25 @@ pub fn judged_run(
 }
 
 /// A served match in the judge's terms; `None` if it names a run that was not sent.
-pub fn judged_match(found: &PlaceMatch, names: &[&str]) -> Option<JudgedMatch> {
-    let interval = |interval: &locution_client::MatchInterval| {
-        Some(Interval {
-            run_idx: names.iter().position(|name| *name == interval.run)? as u32,
-            first: u32::try_from(interval.first).ok()?,
-            last: u32::try_from(interval.last).ok()?,
-        })
+pub fn judged_match(found: &Match, names: &[&str]) -> Option<JudgedMatch> {
+    let interval = |interval: &wire::Interval| {
+        let run_idx = names.iter().position(|name| *name == interval.run)? as u32;
+        Some(Interval { run_idx, first: interval.first, last: interval.last })
     };
     Some(JudgedMatch {
         earlier: interval(&found.earlier)?,
         later: interval(&found.later)?,
-        direction: if found.direction == "opposite" { Direction::Opposite } else { Direction::Same },
+        direction: match found.direction {
+            wire::Direction::Same => Direction::Same,
+            wire::Direction::Opposite => Direction::Opposite,
+        },
         score: found.probability,
-        is_verified: found.state == "verified",
+        is_verified: found.state == MatchState::Verified,
     })
 }
 
 async fn recording_report(client: &Client, sent: &SentRecording) -> Result<RecordingReport> {
-    let words = client.words(SITE, &sent.recording.name, Some(0)).await?;
+    let words = client.words(SITE, &sent.recording.name, 0).await?;
     Ok(RecordingReport {
         name: sent.recording.name.clone(),
         scans: sent.recording.log.scans.len() as u64,
@@ -176,7 +176,7 @@ fn ngram_matches(words: &[Word]) -> Result<BTreeMap<usize, usize>> {
             class: word.class,
             size: word.size,
             turn_rad: word.turn_rad,
-            observations: word.observations,
+            observations: word.observations.into(),
             predecessors: word
                 .predecessors
                 .iter()

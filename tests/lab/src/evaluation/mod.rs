@@ -14,6 +14,7 @@ mod map_error;
 mod open_world;
 mod recognition;
 mod revisits;
+mod spoiled_graphs;
 mod summary;
 mod trajectory_error;
 mod truth_join;
@@ -30,6 +31,7 @@ pub use recognition::{
     judge_recognition,
 };
 pub use revisits::{JudgedRun, Revisits, Visit, find_revisits};
+pub use spoiled_graphs::{Generator, OutlierDraw, rms_error_m, spoil};
 pub use summary::MeanSd;
 pub use trajectory_error::{TrajectoryError, judge_trajectory};
 pub use truth_join::{OdometryPose, join_truth};

@@ -3,7 +3,7 @@
 use rand::{Rng, RngExt};
 
 /// A standard normal deviate (Box and Muller 1958).
-pub(super) fn standard_normal(rng: &mut impl Rng) -> f64 {
+pub(crate) fn standard_normal(rng: &mut impl Rng) -> f64 {
     // One minus keeps the logarithm's argument away from zero.
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()

@@ -13,6 +13,7 @@ mod config;
 mod drive;
 mod gaussian;
 mod odometry;
+mod odometry_faults;
 mod path;
 mod people;
 mod planner;
@@ -21,6 +22,8 @@ mod run;
 mod world;
 
 pub use config::{DriveConfig, LaserConfig, OdometryNoise, PeopleConfig, SimulationConfig};
+pub(crate) use gaussian::standard_normal;
+pub use odometry_faults::{OdometryFault, inject};
 pub use planner::{PlanError, Planner};
 pub use ray_cast::Disc;
 pub use run::{SimulatedRun, SimulationError, Task, simulate_run};

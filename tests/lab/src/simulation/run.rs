@@ -55,8 +55,10 @@ pub enum SimulationError {
     /// A route of fewer than two waypoints, or a length that is not a positive number.
     #[error("a task needs two waypoints or a positive length in metres")]
     EmptyTask,
-    /// No place of the world is connected to a place five metres off.
-    #[error("the world has no room to wander in")]
+    /// Nowhere in the world can a robot of this size drive half a metre.
+    #[error(
+        "the world has no room to wander in: there is no floor on which the robot can drive half a metre"
+    )]
     NoRoom,
 }
 
@@ -112,6 +114,11 @@ fn noisy_reading(range_m: f64, noise_std_m: f64, rng: &mut impl Rng) -> f32 {
     let noisy_m = range_m + noise_std_m * standard_normal(rng);
     ((noisy_m.max(0.01) * 1000.0).round() / 1000.0) as f32
 }
+
+/// Goals of wandering are at least this far off where the world allows it, metres.
+const GOAL_M: f64 = 5.0;
+/// Where no place is this far off there is no room to drive, metres.
+const GOAL_MIN_M: f64 = 0.5;
 
 /// Plans and drives in one world.
 struct Driver<'a> {
@@ -193,7 +200,7 @@ impl Driver<'_> {
         poses.extend(drive_along(&path, &start, config));
     }
 
-    /// A random place from which at least 5 m can be driven.
+    /// A random place that is connected to much of the floor.
     fn random_start(&self, rng: &mut impl Rng) -> Result<Point2, SimulationError> {
         let cells = self.planner.standing_cells();
         for _ in 0..100 {
@@ -210,7 +217,8 @@ impl Driver<'_> {
         Err(SimulationError::NoRoom)
     }
 
-    /// The least visited of five random places that can be reached and are at least 5 m off.
+    /// The least visited of five random places that can be reached and are at least 5 m off, or, in a smaller world,
+    /// at least half as far as the farthest.
     fn random_goal(
         &self,
         ways: &WaysFrom,
@@ -218,15 +226,15 @@ impl Driver<'_> {
         poses: &[Pose2],
         rng: &mut impl Rng,
     ) -> Option<Point2> {
-        let reachable: Vec<usize> = self
-            .planner
-            .standing_cells()
-            .into_iter()
-            .filter(|&cell| ways.reaches(cell) && self.planner.center(cell).distance(here) > 5.0)
-            .collect();
-        if reachable.is_empty() {
+        let mut reachable: Vec<usize> =
+            self.planner.standing_cells().into_iter().filter(|&cell| ways.reaches(cell)).collect();
+        let distance_m = |cell: &usize| self.planner.center(*cell).distance(here);
+        let farthest_m = reachable.iter().map(distance_m).fold(0.0, f64::max);
+        if farthest_m < GOAL_MIN_M {
             return None;
         }
+        let at_least_m = if farthest_m > GOAL_M { GOAL_M } else { 0.5 * farthest_m };
+        reachable.retain(|cell| distance_m(cell) > at_least_m);
         let visits = |place: &Point2| {
             poses.iter().step_by(10).filter(|pose| pose.position().distance(place) < 3.0).count()
         };
@@ -300,6 +308,20 @@ mod tests {
             assert!(poses.iter().all(|pose| world.clearance_m(&pose.position()) > 0.15));
             assert!(run.scans.iter().all(|scan| scan.ranges_m.len() == 181 && scan.ranges_m[90] > 0.0));
         }
+    }
+
+    #[test]
+    fn wandering_in_a_small_arena_goes_as_far_as_it_allows() {
+        let arena = World::drawn("#######\n#.....#\n#..#..#\n#.....#\n#######");
+        let task = Task::Wander { length_m: 20.0, start: None };
+        let run = simulate_run(&arena, &task, &SimulationConfig::default(), 3).unwrap();
+        let poses: Vec<Pose2> = run.truth.iter().map(|pose| pose.truth_from_robot).collect();
+        let driven_m: f64 = poses.windows(2).map(|pair| pair[0].distance(&pair[1])).sum();
+        assert!((20.0..25.0).contains(&driven_m), "{driven_m}");
+        assert!(poses.iter().all(|pose| arena.holds(pose)));
+        let closet = World::drawn("###\n#.#\n###");
+        let task = Task::Wander { length_m: 20.0, start: Some(Point2::new(0.75, 0.75)) };
+        assert!(simulate_run(&closet, &task, &SimulationConfig::default(), 3).is_err());
     }
 
     #[test]

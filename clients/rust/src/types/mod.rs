@@ -1,0 +1,32 @@
+//! Bodies of requests and answers, by their names in the API's document.
+//!
+//! Answers may gain members in later versions of the server; what is not known here is passed over.
+
+mod jobs;
+mod localizations;
+mod maps;
+mod matches;
+mod runs;
+mod sites;
+mod texts;
+mod values;
+
+pub use jobs::{Job, JobKind, JobState};
+pub use localizations::{
+    ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState, Missing,
+    NewLocalization, PosePrior,
+};
+pub use maps::{
+    Change, ChangeKind, Component, Connection, ConnectionKind, Grid, GridInfo, KeyframePose, Label,
+    LabelAnswer, LabelPattern, LabelQuery, Map, MapRun, MapStatistics, Place, PlaceLabel, Region, Route,
+    RouteStep, RouteTurn, Turn,
+};
+pub use matches::{
+    Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,
+};
+pub use runs::{Geometry, NewRun, Receipt, Run, RunState, Scan, StoredScan};
+pub use sites::{Site, SiteSummary};
+pub use texts::{
+    Frame, Observation, StampedPose, Trajectory, Word, WordAnswer, WordId, WordPattern, WordQuery,
+};
+pub use values::{Direction, Point, Pose};

@@ -1,0 +1,270 @@
+//! The map in the formats of other tools. A form is made only for a client that does not have it yet.
+
+use std::sync::Arc;
+
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts;
+use axum::http::{HeaderMap, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use locution_engine::formats::{GrayImage, write_pgm};
+use locution_engine::occupancy::{CellState, GridMap};
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::app::maps::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
+use crate::app::site::Site;
+use crate::app::{AppError, on_blocking_thread};
+use crate::error::ApiError;
+use crate::extract::{Params, SiteOf};
+use crate::http::resources::maps::MapParams;
+use crate::http::resources::texts::trajectory_as_tum;
+use crate::http::values::PoseDto;
+use crate::records::Map;
+use crate::state::AppState;
+
+/// The map that a request means, and what the client already has of it.
+pub struct MapAt {
+    state: AppState,
+    pub(super) site: Arc<Site>,
+    pub(super) map: Map,
+    pub(super) component: Option<u32>,
+    headers: HeaderMap,
+}
+
+impl FromRequestParts<AppState> for MapAt {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
+        let SiteOf(site) = SiteOf::from_request_parts(parts, state).await?;
+        let Params(params) = Params::<MapParams>::from_request_parts(parts, state).await?;
+        let map = site.map(params.version).await?;
+        let headers = parts.headers.clone();
+        Ok(Self { state: state.clone(), site, map, component: params.component, headers })
+    }
+}
+
+impl MapAt {
+    /// The occupancy grid of the component, the first unless said.
+    async fn grid(&self) -> Result<Arc<GridMap>, ApiError> {
+        Ok(self.state.app.grid(&self.site, &self.map, self.component.unwrap_or(0)).await?)
+    }
+
+    async fn picture(&self, form: PictureForm) -> Result<Vec<u8>, ApiError> {
+        Ok(self.state.app.picture(&self.site, &self.map, self.component, form).await?)
+    }
+
+    /// The version's ETag. A site that was deleted and made again counts its versions anew, so the build is told apart
+    /// by when and of what it was made too.
+    fn tag(&self) -> String {
+        let mut build = crc32fast::Hasher::new();
+        build.update(&self.map.record.duration_s.to_le_bytes());
+        for run in &self.map.record.runs {
+            build.update(run.name.as_bytes());
+            build.update(&run.num_scans.to_le_bytes());
+        }
+        format!("\"{}-{:08x}\"", self.map.record.version, build.finalize())
+    }
+
+    /// A form of the map with its ETag; 304, and nothing is made, when the client has it.
+    pub(super) async fn answer(
+        &self,
+        content_type: &'static str,
+        body: impl Future<Output = Result<Vec<u8>, ApiError>>,
+    ) -> Result<Response, ApiError> {
+        let tag = self.tag();
+        if is_known(&self.headers, &tag) {
+            return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
+        }
+        let headers = [(header::ETAG, tag), (header::CONTENT_TYPE, content_type.to_owned())];
+        Ok((headers, body.await?).into_response())
+    }
+}
+
+/// Whether a client says that it has what a tag names; weak tags and lists of them count.
+fn is_known(headers: &HeaderMap, tag: &str) -> bool {
+    let known = headers.get_all(header::IF_NONE_MATCH).into_iter().filter_map(|value| value.to_str().ok());
+    known
+        .flat_map(|list| list.split(','))
+        .map(str::trim)
+        .any(|known| known == "*" || known.strip_prefix("W/").unwrap_or(known) == tag)
+}
+
+/// An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct GridDto {
+    /// Where and how large.
+    pub info: GridInfoDto,
+    /// Row by row from the lower left: 0 free, 100 occupied, −1 unknown.
+    pub data: Vec<i8>,
+}
+
+/// `nav_msgs/MapMetaData`.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct GridInfoDto {
+    /// Metres per cell.
+    pub resolution: f64,
+    /// Cells.
+    pub width: usize,
+    /// Cells.
+    pub height: usize,
+    /// Pose of the lower left corner.
+    pub origin: PoseDto,
+}
+
+impl From<&GridMap> for GridDto {
+    fn from(grid: &GridMap) -> Self {
+        let value = |cell: &CellState| match cell {
+            CellState::Free => 0,
+            CellState::Occupied => 100,
+            CellState::Unknown => -1,
+        };
+        let origin = grid.origin();
+        Self {
+            info: GridInfoDto {
+                resolution: grid.resolution_m(),
+                width: grid.width(),
+                height: grid.height(),
+                origin: PoseDto { x: origin.x, y: origin.y, theta: 0.0 },
+            },
+            data: grid.cells().iter().map(value).collect(),
+        }
+    }
+}
+
+/// The YAML of `map_server` for the PGM of the same grid.
+fn yaml_of(grid: &GridMap) -> String {
+    let origin = grid.origin();
+    format!(
+        "image: grid.pgm\nresolution: {}\norigin: [{}, {}, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n\
+         free_thresh: 0.196\n",
+        grid.resolution_m(),
+        origin.x,
+        origin.y
+    )
+}
+
+/// A grey picture as PNG.
+fn gray_png(image: &GrayImage) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, image.width as u32, image.height as u32);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&image.pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The occupancy grid of a component, with the fields of `nav_msgs/OccupancyGrid`.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/grid", operation_id = "get_grid", tag = "maps", params(MapParams),
+    responses((status = 200, description = "The grid", body = GridDto),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_grid(at: MapAt) -> Result<Response, ApiError> {
+    let body = async {
+        let grid = at.grid().await?;
+        let json = on_blocking_thread(move || serde_json::to_vec(&GridDto::from(&*grid))).await?;
+        Ok(json.map_err(AppError::internal)?)
+    };
+    at.answer("application/json", body).await
+}
+
+/// The same as PGM for `map_server`; its YAML is beside it.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/grid.pgm", operation_id = "get_grid_pgm", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The grid", content_type = "image/x-portable-graymap"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_grid_pgm(at: MapAt) -> Result<Response, ApiError> {
+    let body = async {
+        let grid = at.grid().await?;
+        Ok(on_blocking_thread(move || write_pgm(&gray_image(&grid))).await?)
+    };
+    at.answer("image/x-portable-graymap", body).await
+}
+
+/// The same as PNG.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/grid.png", operation_id = "get_grid_png", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The grid", content_type = "image/png"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_grid_png(at: MapAt) -> Result<Response, ApiError> {
+    let body = async {
+        let grid = at.grid().await?;
+        let png = on_blocking_thread(move || gray_png(&gray_image(&grid))).await?;
+        Ok(png.map_err(AppError::internal)?)
+    };
+    at.answer("image/png", body).await
+}
+
+/// What `map_server` wants to know of the PGM.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/grid.yaml", operation_id = "get_grid_yaml", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The grid's YAML", body = String, content_type = "application/yaml"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_grid_yaml(at: MapAt) -> Result<Response, ApiError> {
+    at.answer("application/yaml", async { Ok(yaml_of(&*at.grid().await?).into_bytes()) }).await
+}
+
+/// The pose graph in g2o's format.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/graph.g2o", operation_id = "get_graph_g2o", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The graph", body = String, content_type = "text/plain"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
+    let body = async { Ok(graph_as_g2o(&at.map, at.component).await?.into_bytes()) };
+    at.answer("text/plain; charset=utf-8", body).await
+}
+
+/// Poses of all scans of all runs in TUM's format.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/trajectory.tum", operation_id = "get_map_tum", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "A pose a line", body = String, content_type = "text/plain"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
+    let body = async {
+        let poses = map_trajectories(&at.site, &at.map, at.component).await?;
+        Ok(trajectory_as_tum(&poses).into_bytes())
+    };
+    at.answer("text/plain; charset=utf-8", body).await
+}
+
+/// A picture: walls, a colour per run, verified matches; components side by side.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/picture.png", operation_id = "get_picture_png", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The picture", content_type = "image/png"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_picture_png(at: MapAt) -> Result<Response, ApiError> {
+    at.answer("image/png", at.picture(PictureForm::Png)).await
+}
+
+/// The same as SVG.
+#[utoipa::path(get, path = "/v1/sites/{site}/map/picture.svg", operation_id = "get_picture_svg", tag = "maps",
+    params(MapParams),
+    responses((status = 200, description = "The picture", body = String, content_type = "image/svg+xml"),
+        (status = 304, description = "The client has this version"),
+        (status = 409, description = "No map has been built yet")))]
+pub async fn get_picture_svg(at: MapAt) -> Result<Response, ApiError> {
+    at.answer("image/svg+xml", at.picture(PictureForm::Svg)).await
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn weak_and_listed_tags_are_known() {
+        let known = |value: &'static str| {
+            let headers = [(header::IF_NONE_MATCH, axum::http::HeaderValue::from_static(value))];
+            is_known(&HeaderMap::from_iter(headers), "\"2-ab\"")
+        };
+        assert!(known("\"2-ab\"") && known("\"1\", W/\"2-ab\"") && known("*"));
+        assert!(!known("\"2\"") && !known("2-ab"));
+    }
+}

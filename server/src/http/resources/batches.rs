@@ -1,0 +1,152 @@
+//! Scans in, scans out.
+
+use axum::Json;
+use axum::extract::State;
+use locution_engine::scan::Scan;
+use serde::{Deserialize, Serialize};
+use utoipa::ToSchema;
+
+use crate::app::runs::NewBatch;
+use crate::error::ApiError;
+use crate::extract::{BatchSlot, Body, NoParams, Paged, RunName, SiteOf};
+use crate::http::nanoseconds;
+use crate::http::ranges::RangesDto;
+use crate::http::values::{Page, PageParams, PoseDto};
+use crate::records::Receipt;
+use crate::state::AppState;
+
+/// One sweep with the odometry at its time.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ScanDto {
+    /// As the robot's clock said, nanoseconds; stored and served, never used to sort.
+    #[serde(with = "nanoseconds")]
+    #[schema(value_type = i64, example = 1763800000000000000i64)]
+    pub timestamp_ns: i64,
+    /// Raw odometry of the robot.
+    pub odom_from_robot: PoseDto,
+    /// Readings in metres, in the order of the geometry's beams.
+    pub ranges_m: RangesDto,
+}
+
+impl ScanDto {
+    /// The engine's scan.
+    ///
+    /// # Errors
+    /// 422 naming the scan, the field and the reading.
+    pub fn check(self, scan_idx: usize) -> Result<Scan, ApiError> {
+        let odom_from_robot = self.odom_from_robot.check().map_err(|(name, problem)| {
+            let detail = format!("the odometry of scan {scan_idx} cannot be: {problem}");
+            ApiError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot.{name}"), detail)
+        })?;
+        let negative = self.ranges_m.0.iter().position(|range_m| *range_m < 0.0);
+        if let Some(range_idx) = negative {
+            let range_m = self.ranges_m.0[range_idx];
+            let detail =
+                format!("range {range_idx} of scan {scan_idx} is {range_m} m; ranges are not negative");
+            return Err(ApiError::invalid_scan(format!("scans[{scan_idx}].ranges_m[{range_idx}]"), detail));
+        }
+        Ok(Scan { timestamp_ns: self.timestamp_ns, odom_from_robot, ranges_m: self.ranges_m.0 })
+    }
+}
+
+/// Scans to append to a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BatchDto {
+    /// Sequence number of the first scan; the first scan of a run has 0.
+    #[schema(example = 0)]
+    pub first_sequence: u64,
+    /// In order.
+    pub scans: Vec<ScanDto>,
+}
+
+impl TryFrom<BatchDto> for NewBatch {
+    type Error = ApiError;
+
+    fn try_from(batch: BatchDto) -> Result<Self, ApiError> {
+        let scans = batch.scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
+        Ok(Self { first_sequence: batch.first_sequence, scans: scans.collect::<Result<_, _>>()? })
+    }
+}
+
+/// The answer to an accepted batch, also when it is repeated.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct ReceiptDto {
+    /// The sequence number to send next.
+    pub next_sequence: u64,
+    /// Observations of the run after this batch.
+    pub num_observations: u64,
+    /// Words of all levels of the run after this batch.
+    pub num_words: u64,
+}
+
+impl From<Receipt> for ReceiptDto {
+    fn from(receipt: Receipt) -> Self {
+        Self {
+            next_sequence: receipt.next_sequence,
+            num_observations: receipt.num_observations,
+            num_words: receipt.num_words,
+        }
+    }
+}
+
+/// A stored scan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct StoredScanDto {
+    /// Sequence number.
+    pub scan_seq: u64,
+    /// As sent.
+    pub timestamp_ns: i64,
+    /// As sent.
+    pub odom_from_robot: PoseDto,
+    /// As sent; readings without a return are null.
+    pub ranges_m: RangesDto,
+}
+
+impl StoredScanDto {
+    /// A scan with its number.
+    pub fn new(scan_seq: u64, scan: Scan) -> Self {
+        Self {
+            scan_seq,
+            timestamp_ns: scan.timestamp_ns,
+            odom_from_robot: scan.odom_from_robot.into(),
+            ranges_m: RangesDto(scan.ranges_m),
+        }
+    }
+}
+
+/// Append scans to a run; 200 means that they are translated and on disk.
+///
+/// Idempotent by sequence number: repeating an accepted batch answers as before and changes nothing. A gap, or an
+/// overlap that differs from what is stored, answers 409 with `expected_sequence`.
+#[utoipa::path(post, path = "/v1/sites/{site}/runs/{run}/batches", operation_id = "append_batch", tag = "runs",
+    request_body(content((BatchDto = "application/json"), (BatchDto = "application/cbor"))),
+    responses((status = 200, description = "The scans are translated and on disk", body = ReceiptDto),
+        (status = 409, description = "The batch does not continue the run; `expected_sequence` says what does")))]
+pub async fn append_batch(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    RunName(name): RunName,
+    BatchSlot(_slot): BatchSlot,
+    Body(batch): Body<BatchDto>,
+) -> Result<Json<ReceiptDto>, ApiError> {
+    let receipt = state.app.append_batch(site, &name, batch.try_into()?).await?;
+    Ok(Json(receipt.into()))
+}
+
+/// Stored scans, in order.
+#[utoipa::path(get, path = "/v1/sites/{site}/runs/{run}/scans", operation_id = "list_scans", tag = "runs",
+    params(PageParams),
+    responses((status = 200, description = "A page of scans", body = Page<StoredScanDto>)))]
+pub async fn list_scans(
+    SiteOf(site): SiteOf,
+    RunName(name): RunName,
+    Paged(NoParams {}, page): Paged<NoParams>,
+) -> Result<Json<Page<StoredScanDto>>, ApiError> {
+    let run = site.run(&name).await?;
+    let scans = run.scans(page.first..page.first.saturating_add(page.limit as u64)).await?;
+    let items =
+        (page.first..).zip(scans).map(|(scan_seq, scan)| StoredScanDto::new(scan_seq, scan)).collect();
+    Ok(Json(Page::of(items, page.first, run.head.next_sequence)))
+}
