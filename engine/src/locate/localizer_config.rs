@@ -80,7 +80,7 @@ impl Default for LocalizerConfig {
             recent_agreement_min: 0.75,
             recent_coverage_min: 0.4,
             num_contradictions_max: 2,
-            weights: [-7.48, -1.83, -1.98, 0.0, 2.03, 0.0, 0.90, 1.09],
+            weights: [-7.47, -1.84, -1.98, 0.0, 2.03, 0.0, 0.90, 1.09],
             sure_sd_max_m: 0.5,
             min_travel_m: 3.0,
             sure_probability: 0.99,
