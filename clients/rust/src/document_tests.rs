@@ -84,7 +84,7 @@ fn bodies_have_every_member_of_the_document() {
     }
     check! {
         Change ChangeKind Channel Component Connection ConnectionKind DecisionKind Direction Evidence
-        ExampleAnswer ExampleEvidence ExamplePlace Frame Geometry Grid GridInfo Hypothesis Interval Job JobKind
+        ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval Job JobKind
         JobState KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
         MapRun MapStatistics Match MatchState Missing NewLocalization NewRun Observation Place PlaceLabel Point
         Pose PosePrior Receipt Region Registration RejectionReason Route RouteStep RouteTurn Run RunState Scan
