@@ -120,7 +120,7 @@ async fn the_server_ends_in_time_and_keeps_what_it_accepted() {
         assert_eq!(server.api.get(&format!("/v1/sites/s/runs/{run}")).await.ok()["num_scans"], 900);
     }
     // The interrupted build is begun anew, and being interrupted by an orderly end is no failed attempt.
-    let path = format!("/v1/sites/s/jobs/{}", job["id"]);
+    let path = format!("/v1/sites/s/jobs/{}", job["id"].as_str().unwrap());
     let deadline = Instant::now() + Duration::from_secs(120);
     while server.api.get(&path).await.ok()["state"] != "done" {
         assert!(Instant::now() < deadline);
@@ -151,6 +151,7 @@ async fn the_process_ends_within_ten_seconds_of_sigterm_whatever_is_under_way() 
     for run in ["r1", "r2", "r3", "r4"] {
         assert_eq!(revived.api().get(&format!("/v1/sites/s/runs/{run}")).await.ok()["num_scans"], 1_200);
     }
-    let state = revived.api().get(&format!("/v1/sites/s/jobs/{}", job["id"])).await.ok()["state"].clone();
+    let path = format!("/v1/sites/s/jobs/{}", job["id"].as_str().unwrap());
+    let state = revived.api().get(&path).await.ok()["state"].clone();
     assert!(["queued", "running", "done"].iter().any(|known| state == *known), "{state}");
 }
