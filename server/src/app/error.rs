@@ -87,6 +87,11 @@ impl AppError {
         Self::NotFound { kind, name: name.to_string() }
     }
 
+    /// The server is on its way out.
+    pub fn stopping() -> Self {
+        Self::Busy { queue: "the server, which is stopping,", retry_after: Duration::from_secs(5) }
+    }
+
     /// A bug of ours.
     pub fn internal(what: impl ToString) -> Self {
         Self::Internal { what: what.to_string() }

@@ -16,12 +16,12 @@
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
 
 use locution_engine::locate::ServedMap;
 use locution_engine::occupancy::GridMap;
 use lru::LruCache;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::Semaphore;
+use tokio_util::sync::CancellationToken;
 
 use crate::config::ServerConfig;
 use crate::storage::Storage;
@@ -31,10 +31,13 @@ pub mod backups;
 mod error;
 #[cfg(test)]
 mod faults;
+mod gauges;
 mod jobs;
 pub mod maps;
 mod names;
 pub mod runs;
+#[cfg(test)]
+mod script_tests;
 pub mod site;
 mod sites;
 
@@ -57,7 +60,6 @@ pub struct App {
     sites: Mutex<HashMap<Name, Arc<Site>>>,
     making_sites: tokio::sync::Mutex<()>,
     opening_sites: tokio::sync::Mutex<()>,
-    batch_slots: Arc<Semaphore>,
     job_slots: Semaphore,
     open_runs: OpenRuns,
     grids: Mutex<LruCache<GridKey, Arc<GridMap>>>,
@@ -65,13 +67,14 @@ pub struct App {
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
     localizations: Localizations,
     place_indexes: PlaceIndexes,
+    /// Set when the server ends: jobs give way.
+    stop: CancellationToken,
 }
 
 impl App {
     /// An application over a storage.
     pub fn new(config: ServerConfig, storage: Arc<dyn Storage>) -> Self {
         Self {
-            batch_slots: Arc::new(Semaphore::new(config.limits.num_batches_max)),
             job_slots: Semaphore::new(config.builds.num_builds_max),
             open_runs: OpenRuns::new(config.limits.num_open_runs_max),
             grids: Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
@@ -79,6 +82,7 @@ impl App {
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             localizations: Localizations::default(),
             place_indexes: PlaceIndexes::default(),
+            stop: CancellationToken::new(),
             config,
             storage,
             sites: Mutex::default(),
@@ -90,17 +94,6 @@ impl App {
     /// The configuration it runs with.
     pub fn config(&self) -> &ServerConfig {
         &self.config
-    }
-
-    /// A place in the bounded queue of batches; taken before a body is read, so that memory stays bounded.
-    ///
-    /// # Errors
-    /// [`AppError::Busy`] when all are taken.
-    pub fn batch_slot(&self) -> Result<OwnedSemaphorePermit, AppError> {
-        let queue = "the queue of batches";
-        Arc::clone(&self.batch_slots)
-            .try_acquire_owned()
-            .map_err(|_| AppError::Busy { queue, retry_after: Duration::from_secs(1) })
     }
 
     /// Opens every site, so that what was interrupted goes on; a site that cannot be opened does not stop the others.
@@ -122,6 +115,11 @@ impl App {
     /// Why it does not.
     pub async fn check_ready(&self) -> Result<(), AppError> {
         Ok(self.storage.list().await.map(|_| ())?)
+    }
+
+    /// Lets jobs give way; they are begun anew at the next start.
+    pub fn stop_jobs(&self) {
+        self.stop.cancel();
     }
 
     /// Finishes what is under way and closes the storage.

@@ -100,7 +100,8 @@ impl App {
             return Err(AppError::not_found("site", name));
         }
         let store = self.storage.open(name.as_str()).await?;
-        let site = Arc::new(Site::open(name, store, new_birth()?).await?);
+        let site = Site::open(name, store, self.stop.child_token(), new_birth()?).await?;
+        let site = Arc::new(site);
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
         self.work_on(&site);
         index_texts(&site);
@@ -149,9 +150,11 @@ impl App {
     /// [`AppError::NotFound`].
     pub async fn delete_site(self: &Arc<Self>, name: &Name) -> Result<(), AppError> {
         let _queue = self.making_sites.lock().await;
-        // A site that cannot be opened can still be deleted.
-        if let Err(AppError::NotFound { kind, name }) = self.site(name).await {
-            return Err(AppError::NotFound { kind, name });
+        match self.site(name).await {
+            Ok(site) => site.stop.cancel(),
+            Err(AppError::NotFound { kind, name }) => return Err(AppError::NotFound { kind, name }),
+            // A site that cannot be opened can still be deleted.
+            Err(_) => {}
         }
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
         Ok(self.storage.delete(name.as_str()).await?)

@@ -29,8 +29,8 @@ const SURE_PROBABILITY: f64 = 0.9;
 /// … unless its pose can slide farther than this, one standard deviation, metres.
 const SURE_SD_MAX_M: f64 = 0.5;
 
-/// Site and map version.
-type IndexKey = (String, u64);
+/// Birth of the site and map version.
+type IndexKey = (u64, u64);
 
 /// Prepared maps, the latest used first.
 pub struct PlaceIndexes {
@@ -150,7 +150,7 @@ impl App {
         site: &Site,
         map: &Map,
     ) -> Result<Arc<PlaceIndex>, AppError> {
-        let key = (site.name().to_string(), map.record.version);
+        let key = (site.birth(), map.record.version);
         if let Some(index) = self.place_indexes.get(&key) {
             return Ok(index);
         }

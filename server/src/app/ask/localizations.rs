@@ -75,7 +75,9 @@ struct SessionTable {
 }
 
 struct Session {
-    site: String,
+    /// Birth of the site.
+    site: u64,
+    owner: Arc<str>,
     geometry: ScanGeometry,
     map_version: u64,
     latest_use: Mutex<Instant>,
@@ -188,7 +190,7 @@ impl Memory {
 }
 
 impl App {
-    /// Opens a session in the serving map.
+    /// Opens a session in the serving map, for an owner who may have a limit of his own.
     ///
     /// # Errors
     /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
@@ -197,18 +199,22 @@ impl App {
         &self,
         site: &Site,
         geometry: ScanGeometry,
+        owner: Arc<str>,
+        num_own_max: Option<usize>,
     ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
         let search = self.new_search(site, &map, &geometry).await?;
         let session = Session {
-            site: site.name().to_string(),
+            site: site.birth(),
+            owner,
             geometry,
             map_version: map.record.version,
             latest_use: Mutex::new(Instant::now()),
             search: tokio::sync::Mutex::new(search),
         };
-        let id = self.localizations.insert(session, self.config().limits.num_localizations_max)?;
+        let id =
+            self.localizations.insert(session, self.config().limits.num_localizations_max, num_own_max)?;
         self.localization(site, id).await
     }
 
@@ -275,7 +281,7 @@ impl App {
 
     fn session(&self, site: &Site, id: u64) -> Result<Arc<Session>, AppError> {
         let table = self.localizations.table();
-        let session = table.sessions.get(&id).filter(|session| session.site == site.name().as_str());
+        let session = table.sessions.get(&id).filter(|session| session.site == site.birth());
         let session = session.ok_or_else(|| AppError::not_found("localisation", id))?;
         *session.latest_use.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         Ok(Arc::clone(session))
@@ -310,7 +316,7 @@ impl App {
 
     /// A component with the fields that localisation looks things up in.
     async fn served_map(&self, site: &Site, map: &Map, component: u32) -> Result<Arc<ServedMap>, AppError> {
-        let key = (site.name().to_string(), map.record.version, component);
+        let key = (site.birth(), map.record.version, component);
         let mut served_maps = self.served_maps.lock().await;
         if let Some(served) = served_maps.get(&key) {
             return Ok(Arc::clone(served));
@@ -329,10 +335,11 @@ impl App {
 
 impl Localizations {
     /// Keeps a session when there is room after the idle ones went.
-    fn insert(&self, session: Session, num_max: usize) -> Result<u64, AppError> {
+    fn insert(&self, session: Session, num_max: usize, num_own_max: Option<usize>) -> Result<u64, AppError> {
         let mut table = self.table();
         table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
-        if table.sessions.len() >= num_max {
+        let num_own = table.sessions.values().filter(|other| other.owner == session.owner).count();
+        if table.sessions.len() >= num_max || num_own_max.is_some_and(|num_own_max| num_own >= num_own_max) {
             let queue = "the table of localisations";
             return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
         }
@@ -340,6 +347,11 @@ impl Localizations {
         let id = table.next_id;
         table.sessions.insert(id, Arc::new(session));
         Ok(id)
+    }
+
+    /// Sessions that are open.
+    pub(in crate::app) fn num_sessions(&self) -> usize {
+        self.table().sessions.len()
     }
 
     fn table(&self) -> std::sync::MutexGuard<'_, SessionTable> {

@@ -70,12 +70,16 @@ impl App {
         let (map, labels) = map_runs(site, Arc::clone(&state.config), runs, decisions).await?;
         progress.at(0.9, "writing the map");
         let duration_s = started.elapsed().as_secs_f64();
+        let before = site.map(None).await.ok();
         let map = write_map(site, &map, &labels, &written, duration_s).await?;
         serve_map(site, map.record.version, self.config().builds.num_versions_kept).await?;
         // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
         progress.at(0.95, "preparing questions by example");
         self.place_index(site, &map).await?;
         let record = &map.record;
+        let num_before = before.map_or(0, |before| before.record.num_verified);
+        metrics::counter!("locution_closures_total")
+            .increment(record.num_verified.saturating_sub(num_before));
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
         Ok(format!(
             "map version {}: {} runs in {} components, {} of {} matches verified, {:.1} s",

@@ -54,22 +54,37 @@ impl App {
         mut job: JobRecord,
         progress: &Arc<Progress>,
     ) -> Result<(), AppError> {
-        let _turn = self.job_slots.acquire().await.map_err(AppError::internal)?;
+        let _turn = tokio::select! {
+            turn = self.job_slots.acquire() => turn.map_err(AppError::internal)?,
+            () = site.stop.cancelled() => return Err(AppError::stopping()),
+        };
         job.state = JobState::Running;
         job.num_attempts += 1;
         site.jobs().store(site.store(), &job).await?;
         let (app, for_task, for_progress) = (Arc::clone(self), Arc::clone(site), Arc::clone(progress));
         let kind = job.kind;
         // A task of its own, so that a panic in the engine becomes a failed job.
-        let work = tokio::spawn(async move {
+        let mut work = tokio::spawn(async move {
             match kind {
                 JobKind::Build => app.build(&for_task, &for_progress).await,
             }
         });
-        match work.await.unwrap_or_else(|error| Err(AppError::internal(error))) {
+        let outcome = tokio::select! {
+            outcome = &mut work => outcome,
+            () = site.stop.cancelled() => {
+                // Nobody waits for a long build at the end: it begins anew at the next start, and this was no failure.
+                work.abort();
+                job.state = JobState::Queued;
+                job.num_attempts -= 1;
+                site.jobs().store(site.store(), &job).await?;
+                return Err(AppError::stopping());
+            }
+        };
+        match outcome.unwrap_or_else(|error| Err(AppError::internal(error))) {
             Ok(detail) => (job.state, job.detail) = (JobState::Done, detail),
             Err(error) => {
                 tracing::warn!(site = %site.name(), job = job.id, %error, "a job failed");
+                metrics::counter!("locution_jobs_failed_total").increment(1);
                 job.state = JobState::Failed;
                 job.detail = progress.detail();
                 job.error = Some(error.to_string());

@@ -103,6 +103,13 @@ impl Jobs {
         Ok(info(record, progress))
     }
 
+    /// How many jobs wait and how many run.
+    pub fn num_jobs(&self) -> (usize, usize) {
+        let table = self.table();
+        let num = |state| table.jobs.values().filter(|(job, _)| job.state == state).count();
+        (num(JobState::Queued), num(JobState::Running))
+    }
+
     /// All jobs, the newest first.
     pub fn all(&self) -> Vec<JobInfo> {
         self.table().jobs.values().rev().map(|(record, progress)| info(record, progress)).collect()

@@ -17,6 +17,7 @@ use bytes::Bytes;
 use locution_engine::config::EngineConfig;
 use locution_engine::mapping::RegistrationMemo;
 use locution_engine::text::Quantizer;
+use tokio_util::sync::CancellationToken;
 
 use super::{AppError, Name};
 use crate::records::{
@@ -46,6 +47,8 @@ pub struct Site {
     /// Registrations that earlier builds computed.
     pub(in crate::app) memo: Mutex<RegistrationMemo>,
     texts: SiteTexts,
+    /// Set when the site is deleted or the server ends: jobs give way.
+    pub(in crate::app) stop: CancellationToken,
 }
 
 /// What a site is and holds.
@@ -73,6 +76,7 @@ impl Site {
     pub(in crate::app) async fn open(
         name: &Name,
         store: Arc<dyn SiteStore>,
+        stop: CancellationToken,
         birth_if_none: u64,
     ) -> Result<Self, AppError> {
         let bytes = store.get(&Key::Site.encode()).await?.ok_or_else(|| AppError::not_found("site", name))?;
@@ -89,12 +93,23 @@ impl Site {
             build_requests: AtomicU64::new(0),
             memo: Mutex::default(),
             texts: SiteTexts::default(),
+            stop,
         };
         if is_outdated {
             // The birth just drawn must be the same after the next start.
             site.change(|_, _| Ok(())).await.or_else(unless_full)?;
         }
         Ok(site)
+    }
+
+    /// Tells this site from any other that had or will have its name.
+    pub fn birth(&self) -> u64 {
+        self.state().record.birth
+    }
+
+    /// Bytes of the indexes of its texts.
+    pub(in crate::app) fn num_index_bytes(&self) -> usize {
+        self.texts.num_index_bytes()
     }
 
     pub fn name(&self) -> &Name {

@@ -8,7 +8,7 @@ use utoipa::ToSchema;
 
 use crate::app::runs::NewBatch;
 use crate::error::ApiError;
-use crate::extract::{BatchSlot, Body, NoParams, Paged, RunName, SiteOf};
+use crate::extract::{Body, NoParams, Paged, RunName, SiteOf};
 use crate::http::nanoseconds;
 use crate::http::ranges::RangesDto;
 use crate::http::values::{Page, PageParams, PoseDto};
@@ -128,7 +128,6 @@ pub async fn append_batch(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     RunName(name): RunName,
-    BatchSlot(_slot): BatchSlot,
     Body(batch): Body<BatchDto>,
 ) -> Result<Json<ReceiptDto>, ApiError> {
     let receipt = state.app.append_batch(site, &name, batch.try_into()?).await?;

@@ -1,5 +1,7 @@
 //! "Where am I": sessions fed with scans, and questions by example.
 
+use std::sync::Arc;
+
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
@@ -15,7 +17,7 @@ use crate::app::ask::{ExampleInfo, ExamplePlace, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::error::ApiError;
-use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
+use crate::extract::{Body, IdOf, SiteOf};
 use crate::http::values::{ChannelDto, DirectionDto, PoseDto};
 use crate::http::with_location;
 use crate::state::AppState;
@@ -229,10 +231,12 @@ impl From<ExamplePlace> for ExamplePlaceDto {
 pub async fn open_localization(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
+    Extension(identity): Extension<Identity>,
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
     let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.open_localization(&site, geometry).await?;
+    let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
+    let info = state.app.open_localization(&site, geometry, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }
@@ -257,7 +261,6 @@ pub async fn localize(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     IdOf(id): IdOf,
-    BatchSlot(_slot): BatchSlot,
     Body(batch): Body<BatchDto>,
 ) -> Result<Json<LocalizationDto>, ApiError> {
     Ok(Json(state.app.localize(&site, id, batch.try_into()?).await?.into()))
@@ -283,7 +286,6 @@ pub async fn close_localization(
 pub async fn query_example(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
-    BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<ExampleAnswerDto>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
@@ -299,7 +301,6 @@ pub async fn query_example(
 pub async fn query_example_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
-    BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
