@@ -150,13 +150,16 @@ pub struct BuildsConfig {
     pub settle_s: f64,
     /// Most builds at once, over all sites.
     pub num_builds_max: usize,
+    /// How long a build may go on while builds of other sites wait, seconds; then it lets them pass and goes on when its
+    /// turn comes again, for twice as long.
+    pub turn_s: f64,
     /// Map versions kept per site, the serving one included.
     pub num_versions_kept: usize,
 }
 
 impl Default for BuildsConfig {
     fn default() -> Self {
-        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 1, num_versions_kept: 5 }
+        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 2, turn_s: 5.0, num_versions_kept: 5 }
     }
 }
 
@@ -335,6 +338,9 @@ impl ServerConfig {
         }
         if !(self.builds.settle_s >= 0.0 && self.builds.settle_s <= 86_400.0) {
             return invalid("builds.settle_s", "must lie between 0 and 86400 seconds");
+        }
+        if !(self.builds.turn_s > 0.0 && self.builds.turn_s <= 86_400.0) {
+            return invalid("builds.turn_s", "must lie above 0 and at most at 86400 seconds");
         }
         for (idx, origin) in self.web.origins.iter().enumerate() {
             let is_origin = origin.split_once("://").is_some_and(|(scheme, host)| {

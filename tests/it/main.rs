@@ -11,6 +11,7 @@ mod damage;
 mod disk_full;
 mod documentation;
 mod headers;
+mod jobs;
 mod maps;
 mod memory;
 mod power_cut;

@@ -89,6 +89,7 @@ routes! {
     BUILD_MAP "build_map" POST "/v1/sites/{site}/builds";
     LIST_JOBS "list_jobs" GET "/v1/sites/{site}/jobs";
     GET_JOB "get_job" GET "/v1/sites/{site}/jobs/{id}";
+    CANCEL_JOB "cancel_job" DELETE "/v1/sites/{site}/jobs/{id}";
     LIST_MATCHES "list_matches" GET "/v1/sites/{site}/matches";
     GET_MATCH "get_match" GET "/v1/sites/{site}/matches/{id}";
     DECIDE_MATCH "decide_match" PUT "/v1/sites/{site}/matches/{id}/decision";

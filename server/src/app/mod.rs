@@ -16,12 +16,13 @@
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use locution_engine::locate::ServedMap;
 use locution_engine::occupancy::GridMap;
 use lru::LruCache;
-use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
+use tokio_util::task::TaskTracker;
 
 use crate::config::ServerConfig;
 use crate::storage::Storage;
@@ -46,12 +47,16 @@ pub use names::Name;
 pub use sites::ListedSite;
 
 use ask::{Localizations, PlaceIndexes};
+use jobs::Turns;
 use maps::GridKey;
 use runs::OpenRuns;
 use site::Site;
 
 /// Grids kept in memory; each has at most 64 million cells of one byte.
 const NUM_GRIDS_KEPT: NonZeroUsize = NonZeroUsize::new(4).expect("four is not zero");
+
+/// Jobs are waited for so long when the server ends.
+const JOBS_END_MAX: Duration = Duration::from_secs(3);
 
 /// The application: every use case begins here.
 pub struct App {
@@ -60,7 +65,9 @@ pub struct App {
     sites: Mutex<HashMap<Name, Arc<Site>>>,
     making_sites: tokio::sync::Mutex<()>,
     opening_sites: tokio::sync::Mutex<()>,
-    job_slots: Semaphore,
+    turns: Turns,
+    /// Everything that works on jobs.
+    working: TaskTracker,
     open_runs: OpenRuns,
     grids: Mutex<LruCache<GridKey, Arc<GridMap>>>,
     drawing: tokio::sync::Mutex<()>,
@@ -75,7 +82,8 @@ impl App {
     /// An application over a storage.
     pub fn new(config: ServerConfig, storage: Arc<dyn Storage>) -> Self {
         Self {
-            job_slots: Semaphore::new(config.builds.num_builds_max),
+            turns: Turns::new(config.builds.num_builds_max, Duration::from_secs_f64(config.builds.turn_s)),
+            working: TaskTracker::new(),
             open_runs: OpenRuns::new(config.limits.num_open_runs_max),
             grids: Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             drawing: tokio::sync::Mutex::default(),
@@ -122,8 +130,16 @@ impl App {
         self.stop.cancel();
     }
 
-    /// Finishes what is under way and closes the storage.
+    /// Lets jobs give way, waits until they have, and closes the storage.
+    ///
+    /// # Errors
+    /// Those of the storage.
     pub async fn close(&self) -> Result<(), AppError> {
+        self.stop_jobs();
+        self.working.close();
+        if tokio::time::timeout(JOBS_END_MAX, self.working.wait()).await.is_err() {
+            tracing::warn!("a job did not end in time; it begins anew at the next start");
+        }
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).clear();
         Ok(self.storage.close().await?)
     }

@@ -44,6 +44,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(WRITE, routes!(jobs::build_map))
         .ruled(READ, routes!(jobs::list_jobs))
         .ruled(READ, routes!(jobs::get_job))
+        .ruled(WRITE, routes!(jobs::cancel_job))
         .ruled(READ, routes!(matches::list_matches))
         .ruled(READ, routes!(matches::get_match))
         .ruled(WRITE, routes!(matches::decide_match, matches::undecide_match))

@@ -57,6 +57,8 @@ pub enum Key {
     /// A person's word on a pair of places.
     Decision(u64),
     Job(u64),
+    /// Registrations of a build that the end of the server interrupted, in parts of less than one mebibyte.
+    Registrations(u32),
 }
 
 impl Key {
@@ -91,6 +93,7 @@ impl Key {
             Key::Match(version, number) => Writer::new(0x22).u64(*version).u64(*number).done(),
             Key::Decision(number) => Writer::new(0x30).u64(*number).done(),
             Key::Job(number) => Writer::new(0x31).u64(*number).done(),
+            Key::Registrations(part) => Writer::new(0x32).u32(*part).done(),
         }
     }
 
@@ -169,6 +172,11 @@ impl Key {
         vec![0x31]
     }
 
+    /// The prefix of all registrations.
+    pub fn all_registrations() -> Vec<u8> {
+        vec![0x32]
+    }
+
     /// The big-endian number that closes a key, such as the first sequence number of a chunk.
     pub fn last_u64(key: &[u8]) -> Option<u64> {
         key.last_chunk().map(|bytes| u64::from_be_bytes(*bytes))
@@ -236,6 +244,7 @@ mod tests {
             any::<(u64, u64)>().prop_map(|(v, number)| Key::Match(v, number)),
             any::<u64>().prop_map(Key::Decision),
             any::<u64>().prop_map(Key::Job),
+            any::<u32>().prop_map(Key::Registrations),
         ]
     }
 

@@ -37,4 +37,4 @@ pub use scans::{append_scans, find_receipt, is_same_scan, read_scans};
 pub use stored::{
     JobKind, JobRecord, JobState, Receipt, RunHead, RunRecord, SiteRecord, StoredKeyframe, TextHead,
 };
-pub use stored_map::{MapPose, MapRecord, MapRun, StoredLabel};
+pub use stored_map::{Digest, MapPose, MapRecord, MapRun, StoredLabel};

@@ -175,6 +175,8 @@ pub enum JobState {
     /// It did what it should.
     Done,
     Failed,
+    /// Somebody ended it before it was done.
+    Cancelled,
 }
 
 /// `Key::Job`: a job.

@@ -1,24 +1,23 @@
 //! Building the map of a site in the background: load a snapshot, let the engine map it, write a version, serve it.
 
+use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
 use locution_engine::mapping::{
-    Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
-    SiteMap, map_site, weigh_texts,
+    Channel, Decision, Evidence, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
+    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, weigh_texts,
 };
 use locution_engine::semantics::MapLabels;
 use locution_engine::text::{Observation, Word};
+use sha2::{Digest as _, Sha256};
 
-use crate::app::maps::{WrittenRun, serve_map, write_map};
-use crate::app::site::{Progress, Site};
+use crate::app::maps::{MapDraft, WrittenRun, note_made_of, serve_map};
+use crate::app::site::{BuildStage, Progress, Site};
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::{JobKind, Run};
-
-/// Remembered registrations beyond this are forgotten, so that memory stays bounded.
-const NUM_REMEMBERED_MAX: usize = 500_000;
+use crate::records::{Digest, JobKind, Map, Run, SiteRecord, codec};
 
 /// A run with everything the map builder reads.
 struct LoadedRun {
@@ -51,33 +50,50 @@ impl App {
     pub(in crate::app) async fn build(
         self: &Arc<Self>,
         site: &Arc<Site>,
-        progress: &Progress,
+        progress: &Arc<Progress>,
     ) -> Result<String, AppError> {
         let started = Instant::now();
         self.renew_texts(site, progress).await?;
-        progress.at(0.0, "reading the runs");
+        progress.at(BuildStage::Reading, 0.0)?;
         let state = site.state();
         let snapshot = site.snapshot().await?;
         let mut runs = Vec::new();
         for run in 0..state.record.num_runs {
-            runs.push(LoadedRun::load(snapshot.run(run).await?).await?);
-            progress.at(0.1 * f64::from(run + 1) / f64::from(state.record.num_runs), "reading the runs");
+            runs.push(snapshot.run(run).await?);
+        }
+        let decisions: Vec<Decision> =
+            snapshot.decisions().await?.into_iter().map(|(_, decision)| decision).collect();
+        let made_of = digest_of(&state.record, &runs, &decisions);
+        let serving = match site.map(None).await {
+            Err(AppError::NotReady { .. }) => None,
+            map => Some(map?),
+        };
+        if let Some(map) = serving.as_ref().filter(|map| map.record.made_of == made_of) {
+            return self.stands(site, map, progress).await;
+        }
+        let num_runs = runs.len();
+        let mut loaded = Vec::new();
+        for run in runs {
+            loaded.push(LoadedRun::load(run).await?);
+            progress.at(BuildStage::Reading, loaded.len() as f64 / num_runs as f64)?;
         }
         drop(snapshot);
-        progress.at(0.1, "matching places and optimising the graph");
-        let decisions = site.reader().decisions().await?.into_iter().map(|(_, decision)| decision).collect();
-        let written: Vec<WrittenRun> = runs.iter().map(written_run).collect();
-        let (map, labels) = map_runs(site, Arc::clone(&state.config), runs, decisions).await?;
-        progress.at(0.9, "writing the map");
-        let duration_s = started.elapsed().as_secs_f64();
-        let before = site.map(None).await.ok();
-        let map = write_map(site, &map, &labels, &written, duration_s).await?;
+        let written: Vec<WrittenRun> = loaded.iter().map(written_run).collect();
+        let (map, labels) = map_runs(site, Arc::clone(&state.config), loaded, decisions, progress).await?;
+        progress.at(BuildStage::Writing, 0.0)?;
+        let draft = MapDraft::new(site, &map, &labels, &written, made_of)?;
+        drop((map, labels));
+        if let Some(map) = serving.as_ref().filter(|map| draft.is_same_as(&map.record)) {
+            note_made_of(site, &map.record, made_of).await?;
+            return self.stands(site, map, progress).await;
+        }
+        let map = draft.write(site, started.elapsed().as_secs_f64()).await?;
         serve_map(site, map.record.version, self.config().builds.num_versions_kept).await?;
         // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
-        progress.at(0.95, "preparing questions by example");
+        progress.at(BuildStage::Preparing, 0.0)?;
         self.place_index(site, &map).await?;
         let record = &map.record;
-        let num_before = before.map_or(0, |before| before.record.num_verified);
+        let num_before = serving.map_or(0, |serving| serving.record.num_verified);
         metrics::counter!("locution_closures_total")
             .increment(record.num_verified.saturating_sub(num_before));
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
@@ -90,6 +106,18 @@ impl App {
             record.num_matches,
             record.duration_s
         ))
+    }
+
+    /// Ends a build that changes nothing: the version that serves goes on to serve, and pushes no older one out.
+    async fn stands(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        map: &Map,
+        progress: &Progress,
+    ) -> Result<String, AppError> {
+        progress.at(BuildStage::Preparing, 0.0)?;
+        self.place_index(site, map).await?;
+        Ok(format!("map version {} stands: nothing has changed", map.record.version))
     }
 
     /// Builds after some quiet, so that runs which finish together share one build.
@@ -137,12 +165,26 @@ fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
     }
 }
 
+/// The digest of everything that a map is made of, the program included.
+fn digest_of(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest {
+    let mut hasher = Sha256::new();
+    hasher.update(env!("CARGO_PKG_VERSION"));
+    hasher.update(codec::encode(&(&site.config_json, site.generation)));
+    for run in runs {
+        hasher.update(codec::encode(&(run.idx, &run.record.name, &run.head, &run.text.num_words)));
+        hasher.update(codec::encode(&(run.text.num_observations, run.text.num_keyframes)));
+    }
+    decisions.iter().for_each(|decision| hasher.update(codec::encode(decision)));
+    hasher.finalize().into()
+}
+
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
+    progress: &Arc<Progress>,
 ) -> Result<(SiteMap, MapLabels), AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
@@ -150,21 +192,34 @@ async fn map_runs(
         let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
         return Ok((map, labels));
     }
-    let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
-    let (memo, outcome) = on_blocking_thread(move || {
+    let mut memo = site.registrations.take(site.store()).await?;
+    let (progress, site) = (Arc::clone(progress), Arc::clone(site));
+    on_blocking_thread(move || {
+        let told = |step: MapStep| {
+            let stage = match step.stage {
+                MapStage::Settling => BuildStage::Settling,
+                MapStage::Joining => BuildStage::Joining,
+            };
+            match progress.at(stage, step.share) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(_) => ControlFlow::Break(()),
+            }
+        };
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
-            weigh_texts(&records, &mut map, &config.matching);
-            map.matches.append(&mut map.refused);
-            keep_vetoed_visible(&mut map, &decisions);
-            let labels = MapLabels::of(&records, &map, &config.semantics);
-            (map, labels)
-        });
-        (memo, outcome)
+        let outcome = map_site_watched(&config.mapping, &records, &decisions, &mut memo, Watch::new(&told));
+        // Also when the job was given up meanwhile: whoever goes on takes it up.
+        site.registrations.give_back(memo);
+        let mut map = outcome.map_err(|error| match error {
+            MappingError::Stopped => AppError::Stopping,
+            MappingError::Graph(error) => AppError::internal(error),
+        })?;
+        progress.at(BuildStage::Weighing, 0.0)?;
+        weigh_texts(&records, &mut map, &config.matching);
+        map.matches.append(&mut map.refused);
+        keep_vetoed_visible(&mut map, &decisions);
+        progress.at(BuildStage::Weighing, 0.5)?;
+        let labels = MapLabels::of(&records, &map, &config.semantics);
+        Ok((map, labels))
     })
-    .await?;
-    if memo.len() <= NUM_REMEMBERED_MAX {
-        *site.memo.lock().unwrap_or_else(PoisonError::into_inner) = memo;
-    }
-    outcome.map_err(AppError::internal)
+    .await?
 }

@@ -16,4 +16,4 @@ pub use labels::{DrivenStretch, LabelAnswer, find_labels, labels};
 pub use matches::{MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide};
 pub use places::{find_route, places};
 pub use regions::{Topology, topology};
-pub use write::{WrittenRun, serve_map, write_map};
+pub use write::{MapDraft, WrittenRun, note_made_of, serve_map};

@@ -4,6 +4,8 @@
 //! they need of its record. Questions and work on a site are use cases of the folders beside this one.
 
 mod jobs;
+mod progress;
+mod registrations;
 mod run_writer;
 mod state;
 mod texts;
@@ -15,7 +17,6 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use bytes::Bytes;
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::RegistrationMemo;
 use locution_engine::text::Quantizer;
 use tokio_util::sync::CancellationToken;
 
@@ -25,7 +26,9 @@ use crate::records::{
 };
 use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 
-pub use jobs::{JobInfo, Jobs, Progress};
+pub use jobs::{JobInfo, Jobs};
+pub use progress::{BuildStage, Ending, Progress};
+pub use registrations::Registrations;
 pub use run_writer::{RunWriter, WriterState};
 pub use state::{SiteState, TextConfig};
 pub use texts::{Segment, SiteTexts};
@@ -45,7 +48,7 @@ pub struct Site {
     jobs: Jobs,
     pub(in crate::app) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
-    pub(in crate::app) memo: Mutex<RegistrationMemo>,
+    pub(in crate::app) registrations: Registrations,
     texts: SiteTexts,
     /// Set when the site is deleted or the server ends: jobs give way.
     pub(in crate::app) stop: CancellationToken,
@@ -84,14 +87,14 @@ impl Site {
         let site = Self {
             name: name.clone(),
             state: RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?)),
-            jobs: Jobs::load(&*store).await?,
+            jobs: Jobs::load(&*store, stop.clone()).await?,
             store,
             writers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
             making_runs: tokio::sync::Mutex::default(),
             serving: tokio::sync::RwLock::default(),
             build_requests: AtomicU64::new(0),
-            memo: Mutex::default(),
+            registrations: Registrations::default(),
             texts: SiteTexts::default(),
             stop,
         };
