@@ -93,6 +93,8 @@ pub struct LimitsConfig {
     /// Most localisations at once.
     #[serde(alias = "num_localisations_max")]
     pub num_localizations_max: usize,
+    /// Most streams of events at once; more are refused with 429.
+    pub num_event_streams_max: usize,
     /// Longest a request may take, seconds.
     pub request_timeout_s: u64,
 }
@@ -119,6 +121,7 @@ impl Default for LimitsConfig {
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localizations_max: 32,
+            num_event_streams_max: 64,
             request_timeout_s: 600,
         }
     }

@@ -163,7 +163,8 @@ impl From<AppError> for ApiError {
                     .retry_after(retry_after.as_secs().max(1))
             }
             AppError::Stopping => {
-                Self::new(StatusCode::SERVICE_UNAVAILABLE, "stopping", "The server stops", detail).retry_after(5)
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "stopping", "The server stops", detail)
+                    .retry_after(5)
             }
             AppError::Storage(error) => Self::from(error),
             AppError::Internal { what } => {

@@ -26,6 +26,7 @@
 
 mod client;
 mod error;
+mod events;
 mod jobs;
 mod localizations;
 mod maps;
@@ -43,6 +44,7 @@ mod document_tests;
 
 pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
+pub use events::Events;
 pub use maps::{MapAt, MapForm};
 pub use matches::MatchFilter;
 pub use types::*;

@@ -21,6 +21,7 @@ use std::time::Duration;
 use locution_engine::locate::ServedMap;
 use locution_engine::occupancy::GridMap;
 use lru::LruCache;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 use tokio_util::task::TaskTracker;
 
@@ -74,6 +75,8 @@ pub struct App {
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
     localizations: Localizations,
     place_indexes: PlaceIndexes,
+    /// Streams of events that may be open at once.
+    event_slots: Arc<Semaphore>,
     /// Set when the server ends: jobs give way.
     stop: CancellationToken,
 }
@@ -90,6 +93,7 @@ impl App {
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             localizations: Localizations::default(),
             place_indexes: PlaceIndexes::default(),
+            event_slots: Arc::new(Semaphore::new(config.limits.num_event_streams_max)),
             stop: CancellationToken::new(),
             config,
             storage,
@@ -102,6 +106,17 @@ impl App {
     /// The configuration it runs with.
     pub fn config(&self) -> &ServerConfig {
         &self.config
+    }
+
+    /// A place among those who watch events.
+    ///
+    /// # Errors
+    /// [`AppError::Busy`] when all are taken.
+    pub fn event_slot(&self) -> Result<OwnedSemaphorePermit, AppError> {
+        let queue = "the table of event streams";
+        Arc::clone(&self.event_slots)
+            .try_acquire_owned()
+            .map_err(|_| AppError::Busy { queue, retry_after: Duration::from_secs(10) })
     }
 
     /// Opens every site, so that what was interrupted goes on; a site that cannot be opened does not stop the others.
@@ -123,6 +138,14 @@ impl App {
     /// Why it does not.
     pub async fn check_ready(&self) -> Result<(), AppError> {
         Ok(self.storage.list().await.map(|_| ())?)
+    }
+
+    /// Forgets what was made of a site's maps, since a run has gone or the configuration has changed.
+    pub(in crate::app) async fn forget_served(&self, site: &Site) {
+        let birth = site.birth();
+        forget_where(&mut self.grids.lock().unwrap_or_else(PoisonError::into_inner), |key| key.0 == birth);
+        forget_where(&mut *self.served_maps.lock().await, |key| key.0 == birth);
+        self.place_indexes.forget(birth);
     }
 
     /// Lets jobs give way; they are begun anew at the next start.
@@ -153,4 +176,15 @@ pub(crate) async fn on_blocking_thread<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, AppError> {
     tokio::task::spawn_blocking(work).await.map_err(AppError::internal)
+}
+
+/// Drops entries of a cache by their keys.
+fn forget_where<K: Clone + Eq + std::hash::Hash, V>(
+    cache: &mut LruCache<K, V>,
+    is_stale: impl Fn(&K) -> bool,
+) {
+    let stale: Vec<K> = cache.iter().map(|(key, _)| key).filter(|key| is_stale(key)).cloned().collect();
+    for key in stale {
+        cache.pop(&key);
+    }
 }

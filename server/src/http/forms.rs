@@ -54,8 +54,10 @@ impl MapAt {
     }
 
     /// The version's ETag. A site that was deleted and made again counts its versions anew, so the site's birth is in it.
+    /// What is drawn of a version is less after a run was deleted.
     fn tag(&self) -> String {
-        format!("\"{}-{:x}\"", self.map.record.version, self.site.birth())
+        let record = &self.site.state().record;
+        format!("\"{}-{:x}-{}\"", self.map.record.version, record.birth, record.num_deleted_runs)
     }
 
     /// A form of the map with its ETag; 304, and nothing is made, when the client has it.

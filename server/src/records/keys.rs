@@ -36,6 +36,8 @@ pub enum Key {
     RunHead(RunIdx),
     /// Up to 256 scans beginning with a sequence number.
     Scans(RunIdx, u64),
+    /// A run was deleted, and traces of it may be left.
+    DeletedRun(RunIdx),
     /// How far the text of a run has come.
     TextHead(Generation, RunIdx),
     /// The translator of a run, in parts of less than one mebibyte.
@@ -70,6 +72,7 @@ impl Key {
             Key::Run(run) => Writer::new(0x03).u32(*run).done(),
             Key::RunHead(run) => Writer::new(0x04).u32(*run).done(),
             Key::Scans(run, first) => Writer::new(0x05).u32(*run).u64(*first).done(),
+            Key::DeletedRun(run) => Writer::new(0x06).u32(*run).done(),
             Key::TextHead(generation, run) => Writer::new(0x10).u32(*generation).u32(*run).done(),
             Key::Checkpoint(generation, run, part) => {
                 Writer::new(0x11).u32(*generation).u32(*run).u32(*part).done()
@@ -100,6 +103,21 @@ impl Key {
     /// The prefix of all scans of a run.
     pub fn all_scans(run: RunIdx) -> Vec<u8> {
         Writer::new(0x05).u32(run).done()
+    }
+
+    /// The prefix of all runs that were deleted and may have left traces.
+    pub fn all_deleted_runs() -> Vec<u8> {
+        vec![0x06]
+    }
+
+    /// The run that the key of a deleted one names.
+    pub fn deleted_run(key: &[u8]) -> Option<RunIdx> {
+        key.last_chunk().map(|bytes| u32::from_be_bytes(*bytes))
+    }
+
+    /// The prefixes of everything of a run that belongs to a text generation.
+    pub fn all_of_text(generation: Generation, run: RunIdx) -> Vec<Vec<u8>> {
+        (0x10..=0x15).map(|tag| Writer::new(tag).u32(generation).u32(run).done()).collect()
     }
 
     /// The prefix of all observations of a run.
@@ -234,6 +252,7 @@ mod tests {
             any::<u32>().prop_map(Key::Run),
             any::<u32>().prop_map(Key::RunHead),
             any::<(u32, u64)>().prop_map(|(run, first)| Key::Scans(run, first)),
+            any::<u32>().prop_map(Key::DeletedRun),
             any::<(u32, u32)>().prop_map(|(generation, run)| Key::TextHead(generation, run)),
             any::<(u32, u32, u32)>().prop_map(|(g, run, part)| Key::Checkpoint(g, run, part)),
             any::<(u32, u32, u64)>().prop_map(|(g, run, first)| Key::Observations(g, run, first)),
@@ -263,6 +282,7 @@ mod tests {
         assert!(Key::places(1, 2, 3).encode().starts_with(&Key::all_places(1, 2)));
         assert!(!Key::places(1, 3, 3).encode().starts_with(&Key::all_places(1, 2)));
         assert_eq!(Key::run_of_packed_text(&Key::PackedText(1, 7, 2).encode()), Some(7));
+        assert_eq!(Key::deleted_run(&Key::DeletedRun(7).encode()), Some(7));
         assert_eq!(Key::last_u64(&Key::Scans(7, 9).encode()), Some(9));
     }
 }

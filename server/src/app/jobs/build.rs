@@ -15,9 +15,10 @@ use locution_engine::text::{Observation, Word};
 use sha2::{Digest as _, Sha256};
 
 use crate::app::maps::{MapDraft, WrittenRun, note_made_of, serve_map};
-use crate::app::site::{BuildStage, Progress, Site};
+use crate::app::runs::{end_deletions, pending_deletions};
+use crate::app::site::{BuildStage, Progress, Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::{Digest, JobKind, Map, Run, SiteRecord, codec};
+use crate::records::{Digest, JobKind, Map, MapRecord, Run, RunIdx, SiteRecord, codec};
 
 /// A run with everything the map builder reads.
 struct LoadedRun {
@@ -53,6 +54,8 @@ impl App {
         progress: &Arc<Progress>,
     ) -> Result<String, AppError> {
         let started = Instant::now();
+        self.enforce_retention(site).await?;
+        let deleted = pending_deletions(site).await?;
         self.renew_texts(site, progress).await?;
         progress.at(BuildStage::Reading, 0.0)?;
         let state = site.state();
@@ -69,7 +72,7 @@ impl App {
             map => Some(map?),
         };
         if let Some(map) = serving.as_ref().filter(|map| map.record.made_of == made_of) {
-            return self.stands(site, map, progress).await;
+            return self.stands(site, map, &deleted, progress).await;
         }
         let num_runs = runs.len();
         let mut loaded = Vec::new();
@@ -85,10 +88,17 @@ impl App {
         drop((map, labels));
         if let Some(map) = serving.as_ref().filter(|map| draft.is_same_as(&map.record)) {
             note_made_of(site, &map.record, made_of).await?;
-            return self.stands(site, map, progress).await;
+            return self.stands(site, map, &deleted, progress).await;
         }
         let map = draft.write(site, started.elapsed().as_secs_f64()).await?;
-        serve_map(site, map.record.version, self.config().builds.num_versions_kept).await?;
+        let num_kept = state
+            .record
+            .retention
+            .num_versions
+            .map_or(self.config().builds.num_versions_kept, |num| num as usize);
+        serve_map(site, map.record.version, num_kept).await?;
+        end_deletions(site, &deleted).await?;
+        tell_of(site, &map);
         // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
         progress.at(BuildStage::Preparing, 0.0)?;
         self.place_index(site, &map).await?;
@@ -113,8 +123,10 @@ impl App {
         self: &Arc<Self>,
         site: &Arc<Site>,
         map: &Map,
+        deleted: &[RunIdx],
         progress: &Progress,
     ) -> Result<String, AppError> {
+        end_deletions(site, deleted).await?;
         progress.at(BuildStage::Preparing, 0.0)?;
         self.place_index(site, map).await?;
         Ok(format!("map version {} stands: nothing has changed", map.record.version))
@@ -136,6 +148,13 @@ impl App {
             }
         });
     }
+}
+
+/// Tells those who watch of a version that begins to serve.
+fn tell_of(site: &Site, map: &Map) {
+    let MapRecord { version, num_components, num_matches, num_verified, .. } = map.record;
+    site.events().tell(SiteEvent::Version { version, num_components });
+    site.events().tell(SiteEvent::Matches { version, num_matches, num_verified });
 }
 
 fn written_run(run: &LoadedRun) -> WrittenRun {

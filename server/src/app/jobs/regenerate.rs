@@ -93,6 +93,9 @@ async fn write_anew(
     progress: &Progress,
 ) -> Result<(), AppError> {
     let stored = site.reader().run(run).await?;
+    if stored.record.is_deleted() {
+        return Ok(());
+    }
     let writer = RunWriter::new(run, Arc::clone(&stored.record), 1);
     let mut state = writer.load(site.store(), generation, text_config).await?;
     while state.num_scans_translated() < stored.head.next_sequence {

@@ -93,9 +93,8 @@ mod tests {
         let ended = Arc::new(Mutex::new(Vec::new()));
         let long = tokio::spawn(work(Arc::clone(&turns), 0, 1_500, Arc::clone(&ended)));
         tokio::time::sleep(Duration::from_millis(5)).await;
-        let short: Vec<_> = (1..4)
-            .map(|name| tokio::spawn(work(Arc::clone(&turns), name, 1, Arc::clone(&ended))))
-            .collect();
+        let short: Vec<_> =
+            (1..4).map(|name| tokio::spawn(work(Arc::clone(&turns), name, 1, Arc::clone(&ended)))).collect();
         for job in short {
             job.await.unwrap();
         }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::turns::Turn;
-use crate::app::site::{Ending, JobInfo, Progress, Site};
+use crate::app::site::{Ending, JobInfo, Progress, Site, SiteEvent};
 use crate::app::{App, AppError};
 use crate::records::{JobKind, JobRecord, JobState, Key, codec};
 
@@ -33,6 +33,7 @@ impl App {
             .await?;
         let id = record.id;
         site.jobs().insert(record);
+        tell_of(site, id);
         self.work_on(site);
         site.jobs().get(id)
     }
@@ -45,6 +46,7 @@ impl App {
         if let Some(cancelled) = site.jobs().cancel(id)? {
             site.jobs().store(site.store(), &cancelled).await?;
             site.jobs().tell_ended();
+            tell_of(site, id);
         }
         match tokio::time::timeout(2 * PATIENCE, site.jobs().ended(id)).await {
             Ok(ended) => ended,
@@ -93,6 +95,7 @@ impl App {
                 begun = site.jobs().begin(id);
                 let Some(job) = &begun else { return Ok(()) };
                 site.jobs().store(site.store(), job).await?;
+                tell_of(site, id);
             }
             progress.go_on();
             let outcome = self.attempt(site, progress, &turn).await;
@@ -142,6 +145,13 @@ impl App {
     }
 }
 
+/// Tells those who watch where a job is.
+fn tell_of(site: &Site, id: u64) {
+    if let Ok(job) = site.jobs().get(id) {
+        site.events().tell(SiteEvent::Job(job));
+    }
+}
+
 /// Stores what became of a job.
 async fn end_job(
     site: &Site,
@@ -176,6 +186,7 @@ async fn end_job(
     }
     let outcome = site.jobs().store(site.store(), &job).await;
     site.jobs().tell_ended();
+    tell_of(site, job.id);
     if !is_stopping {
         return outcome;
     }

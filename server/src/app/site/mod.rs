@@ -3,6 +3,7 @@
 //! The parts (writers of runs, jobs, texts) do not know the site that owns them: they are handed its storage and what
 //! they need of its record. Questions and work on a site are use cases of the folders beside this one.
 
+mod events;
 mod jobs;
 mod progress;
 mod registrations;
@@ -26,6 +27,7 @@ use crate::records::{
 };
 use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 
+pub use events::{EventId, Events, RunChange, SiteEvent, Watched, Watcher};
 pub use jobs::{JobInfo, Jobs};
 pub use progress::{BuildStage, Ending, Progress};
 pub use registrations::Registrations;
@@ -46,6 +48,7 @@ pub struct Site {
     /// Held for reading while scans are appended, for writing while another text generation begins to serve.
     pub(in crate::app) serving: tokio::sync::RwLock<()>,
     jobs: Jobs,
+    events: Arc<Events>,
     pub(in crate::app) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
     pub(in crate::app) registrations: Registrations,
@@ -71,6 +74,13 @@ pub struct SiteInfo {
     pub num_bytes_on_disk: u64,
 }
 
+impl SiteInfo {
+    /// Runs that are there.
+    pub fn num_runs(&self) -> u32 {
+        self.record.num_runs - self.record.num_deleted_runs
+    }
+}
+
 impl Site {
     /// Opens what a storage holds of a site; one from before sites had a birth is given one.
     ///
@@ -88,6 +98,7 @@ impl Site {
             name: name.clone(),
             state: RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?)),
             jobs: Jobs::load(&*store, stop.clone()).await?,
+            events: Arc::new(Events::new(stop.clone())),
             store,
             writers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
@@ -180,7 +191,11 @@ impl Site {
             self.reload(&before).await?;
             return Err(error.into());
         }
-        self.put_state(SiteState { record, config: Arc::clone(&before.config), bytes });
+        let config = match record.config_json == before.record.config_json {
+            true => Arc::clone(&before.config),
+            false => SiteState::decode(bytes.clone(), record.birth)?.config,
+        };
+        self.put_state(SiteState { record, config, bytes });
         Ok(answer)
     }
 
@@ -208,15 +223,34 @@ impl Site {
         }
     }
 
-    /// Up to `limit` runs from number `from` on, in the order of their making.
-    pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<Vec<Run>, AppError> {
-        let end = from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX));
+    /// Up to `limit` runs from number `from` on, in the order of their making, and the number to go on with.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<(Vec<Run>, Option<RunIdx>), AppError> {
         let reader = self.reader();
         let mut runs = Vec::new();
-        for idx in from..end.min(self.state().record.num_runs) {
-            runs.push(reader.run(idx).await?);
+        for idx in from..self.state().record.num_runs {
+            let run = reader.run(idx).await?;
+            if run.record.is_deleted() {
+                continue;
+            }
+            if runs.len() == limit {
+                return Ok((runs, Some(idx)));
+            }
+            runs.push(run);
         }
-        Ok(runs)
+        Ok((runs, None))
+    }
+
+    /// Lets go of the writer of a run that was deleted.
+    pub(in crate::app) fn let_go(&self, name: &Name) {
+        self.writers.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
+    }
+
+    /// Reads and indexes all texts anew when they are next asked about.
+    pub(in crate::app) async fn forget_texts(&self) {
+        self.texts.forget().await;
     }
 
     /// The one writer of a run.
@@ -266,6 +300,11 @@ impl Site {
     /// Its jobs, as far as this process knows.
     pub fn jobs(&self) -> &Jobs {
         &self.jobs
+    }
+
+    /// What happens in it.
+    pub fn events(&self) -> &Arc<Events> {
+        &self.events
     }
 
     /// All texts as they stand, indexed.

@@ -52,14 +52,17 @@ impl Registrations {
     /// # Errors
     /// Those of the storage.
     pub async fn store(&self, store: &dyn SiteStore) -> Result<(), AppError> {
-        let Some(memo) = self.memo().take().filter(|memo| !memo.is_empty() && memo.len() <= NUM_STORED_MAX) else {
+        let Some(memo) = self.memo().take().filter(|memo| !memo.is_empty() && memo.len() <= NUM_STORED_MAX)
+        else {
             return Ok(());
         };
-        let bytes = on_blocking_thread(move || postcard::to_allocvec(&memo)).await?.map_err(AppError::internal)?;
+        let bytes =
+            on_blocking_thread(move || postcard::to_allocvec(&memo)).await?.map_err(AppError::internal)?;
         let pieces: Vec<_> = (0..).zip(pieces(&bytes)).collect();
         for some in pieces.chunks(NUM_PIECES_PER_COMMIT) {
             let mut batch = Batch::default();
-            some.iter().for_each(|(part, piece)| batch.put(Key::Registrations(*part).encode(), piece.clone()));
+            some.iter()
+                .for_each(|(part, piece)| batch.put(Key::Registrations(*part).encode(), piece.clone()));
             store.commit(batch, vec![]).await?;
         }
         Ok(())

@@ -57,6 +57,11 @@ impl SiteTexts {
         texts.finished.iter().chain(growing).map(|segment| segment.index.num_bytes()).sum()
     }
 
+    /// Forgets what was read, since a text has gone.
+    pub async fn forget(&self) {
+        *self.0.lock().await = Texts::default();
+    }
+
     /// All texts of the serving generation as they stand, indexed.
     pub async fn segments(
         &self,

@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::site::JobInfo;
+use crate::app::site::{JobInfo, Site};
 use crate::error::ApiError;
 use crate::extract::{IdOf, NoParams, Paged, Params, SiteOf};
 use crate::http::values::{Page, PageParams};
@@ -108,10 +108,15 @@ pub async fn build_map(
 ) -> Result<Response, ApiError> {
     let job = state.app.queue_job(&site, JobKind::Build).await?;
     if !params.wait {
-        let location = format!("/v1/sites/{}/jobs/{}", site.name(), job.record.id);
-        return Ok(with_location(&location, (StatusCode::ACCEPTED, Json(JobDto::from(job)))));
+        return Ok(accepted(&site, job));
     }
     Ok(Json(JobDto::from(site.jobs().ended(job.record.id).await?)).into_response())
+}
+
+/// 202 with a job and where to watch it.
+pub fn accepted(site: &Site, job: JobInfo) -> Response {
+    let location = format!("/v1/sites/{}/jobs/{}", site.name(), job.record.id);
+    with_location(&location, (StatusCode::ACCEPTED, Json(JobDto::from(job))))
 }
 
 /// All jobs that are remembered, the newest first.

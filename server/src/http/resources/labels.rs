@@ -1,14 +1,18 @@
 //! Labelled places, and questions in their words.
 
-use axum::Json;
+use axum::extract::State;
+use axum::{Extension, Json};
 use locution_engine::semantics::{LabelPattern, PlaceLabel};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::maps::{DrivenStretch, LabelAnswer, find_labels, labels};
+use crate::app::{AppError, Name};
+use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{Body, Paged, SiteOf};
 use crate::http::values::{Page, PageParams, PoseDto};
+use crate::state::AppState;
 
 /// Most parts of a question.
 const NUM_PARTS_MAX: usize = 16;
@@ -168,6 +172,8 @@ impl LabelQueryDto {
 /// Where a question fits.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct LabelAnswerDto {
+    /// The site.
+    pub site: String,
     /// The stretches, in the order of the question.
     pub places: Vec<LabelDto>,
     /// Whether the run drove them the other way round.
@@ -176,9 +182,11 @@ pub struct LabelAnswerDto {
     pub confidence: f64,
 }
 
-impl From<LabelAnswer> for LabelAnswerDto {
-    fn from(answer: LabelAnswer) -> Self {
+impl LabelAnswerDto {
+    /// An answer of a site.
+    pub fn new(site: &Name, answer: LabelAnswer) -> Self {
         Self {
+            site: site.to_string(),
             places: answer.stretches.into_iter().map(LabelDto::from).collect(),
             is_reversed: answer.is_reversed,
             confidence: answer.confidence,
@@ -212,5 +220,30 @@ pub async fn query_labels(
     let (patterns, limit) = query.check()?;
     let map = site.map(None).await?;
     let answers = find_labels(&map, &patterns, limit).await?;
-    Ok(Json(answers.into_iter().map(LabelAnswerDto::from).collect()))
+    Ok(Json(answers.into_iter().map(|answer| LabelAnswerDto::new(site.name(), answer)).collect()))
+}
+
+/// The same over all sites that the key may see, the surest first. Sites without a map are passed over.
+#[utoipa::path(post, path = "/v1/queries/labels", operation_id = "query_labels_everywhere", tag = "maps",
+    request_body = LabelQueryDto,
+    responses((status = 200, description = "Where the labels are driven one after the other", body = Vec<LabelAnswerDto>)))]
+pub async fn query_labels_everywhere(
+    State(state): State<AppState>,
+    Extension(identity): Extension<Identity>,
+    Body(query): Body<LabelQueryDto>,
+) -> Result<Json<Vec<LabelAnswerDto>>, ApiError> {
+    let (patterns, limit) = query.check()?;
+    let mut answers = Vec::new();
+    for site in state.app.sites(|name| identity.may_see(name)).await? {
+        let map = match site.map(None).await {
+            Err(AppError::NotReady { .. }) => continue,
+            map => map?,
+        };
+        let found = find_labels(&map, &patterns, limit).await?;
+        answers.extend(found.into_iter().map(|answer| LabelAnswerDto::new(site.name(), answer)));
+        // A site's best come first, so what is cut off here cannot be among the best of all.
+        answers.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        answers.truncate(limit);
+    }
+    Ok(Json(answers))
 }
