@@ -46,6 +46,6 @@ pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
 pub use events::Events;
 pub use maps::{MapAt, MapForm};
-pub use matches::MatchFilter;
+pub use matches::{MatchFilter, MatchOrder};
 pub use types::*;
 pub use upload::{Encoding, RunUpload};

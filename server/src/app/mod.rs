@@ -42,10 +42,12 @@ pub mod runs;
 mod script_tests;
 pub mod site;
 mod sites;
+mod window;
 
 pub use error::AppError;
 pub use names::Name;
 pub use sites::ListedSite;
+pub use window::{Area, Window};
 
 use ask::{Localizations, PlaceIndexes};
 use jobs::Turns;

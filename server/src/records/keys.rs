@@ -21,6 +21,8 @@ pub enum PartKind {
     Labels = 2,
     /// Places of a component, in pieces.
     Places = 3,
+    /// Where and when the stretches of matches were driven, in the order of the matches.
+    MatchPlaces = 4,
 }
 
 /// Names a stored value of a site.
@@ -242,7 +244,12 @@ mod tests {
     use super::*;
 
     fn any_part() -> impl Strategy<Value = PartKind> {
-        prop_oneof![Just(PartKind::Poses), Just(PartKind::Labels), Just(PartKind::Places)]
+        prop_oneof![
+            Just(PartKind::Poses),
+            Just(PartKind::Labels),
+            Just(PartKind::Places),
+            Just(PartKind::MatchPlaces)
+        ]
     }
 
     fn any_key() -> impl Strategy<Value = Key> {

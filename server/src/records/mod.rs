@@ -38,4 +38,4 @@ pub use stored::{
     JobKind, JobRecord, JobState, Receipt, Retention, RunHead, RunRecord, SiteRecord, StoredKeyframe,
     TextHead,
 };
-pub use stored_map::{Digest, MapPose, MapRecord, MapRun, StoredLabel};
+pub use stored_map::{Digest, MapPose, MapRecord, MapRun, MatchPlace, StoredLabel, StretchPlace};

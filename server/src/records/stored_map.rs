@@ -29,6 +29,8 @@ pub struct MapRecord {
     pub num_verified: u64,
     /// Seconds that building took.
     pub duration_s: f64,
+    /// Whether it says where and when the stretches of matches were driven.
+    pub has_match_places: bool,
     /// Of everything that the version holds, and so the same as that of another version that holds the same.
     pub content: Digest,
     /// Of everything that the version was made of.
@@ -99,6 +101,24 @@ pub struct MapRun {
     pub num_scans: u64,
     /// Metres driven, along the optimised keyframes.
     pub length_m: f64,
+}
+
+/// Where and when a stretch of driving that takes part in a match was driven.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StretchPlace {
+    /// Timestamps of its first and last observation, nanoseconds.
+    pub timestamps_ns: (i64, i64),
+    /// The frame of its pose.
+    pub component: u32,
+    /// Where it was half way.
+    pub map_from_middle: Pose2,
+}
+
+/// The two stretches of a match.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MatchPlace {
+    pub earlier: StretchPlace,
+    pub later: StretchPlace,
 }
 
 /// The pose of a keyframe in the map.

@@ -6,9 +6,11 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
+use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{
-    Channel, Decision, Evidence, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
-    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, weigh_texts,
+    Channel, Decision, Evidence, Interval, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
+    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, place_observations,
+    weigh_texts,
 };
 use locution_engine::semantics::MapLabels;
 use locution_engine::text::{Observation, Word};
@@ -18,7 +20,9 @@ use crate::app::maps::{MapDraft, WrittenRun, note_made_of, serve_map};
 use crate::app::runs::{end_deletions, pending_deletions};
 use crate::app::site::{BuildStage, Progress, Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::{Digest, JobKind, Map, MapRecord, Run, RunIdx, SiteRecord, codec};
+use crate::records::{
+    Digest, JobKind, Map, MapRecord, MatchPlace, Run, RunIdx, SiteRecord, StretchPlace, codec,
+};
 
 /// A run with everything the map builder reads.
 struct LoadedRun {
@@ -82,10 +86,11 @@ impl App {
         }
         drop(snapshot);
         let written: Vec<WrittenRun> = loaded.iter().map(written_run).collect();
-        let (map, labels) = map_runs(site, Arc::clone(&state.config), loaded, decisions, progress).await?;
+        let MadeMap { map, labels, match_places } =
+            map_runs(site, Arc::clone(&state.config), loaded, decisions, progress).await?;
         progress.at(BuildStage::Writing, 0.0)?;
-        let draft = MapDraft::new(site, &map, &labels, &written, made_of)?;
-        drop((map, labels));
+        let draft = MapDraft::new(site, &map, &labels, &match_places, &written, made_of)?;
+        drop((map, labels, match_places));
         if let Some(map) = serving.as_ref().filter(|map| draft.is_same_as(&map.record)) {
             note_made_of(site, &map.record, made_of).await?;
             return self.stands(site, map, &deleted, progress).await;
@@ -184,6 +189,34 @@ fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
     }
 }
 
+/// What the engine makes of runs.
+struct MadeMap {
+    map: SiteMap,
+    labels: MapLabels,
+    match_places: Vec<Option<MatchPlace>>,
+}
+
+/// Where and when the stretches of all matches were driven.
+fn match_places(runs: &[RunRecord<'_>], map: &SiteMap) -> Vec<Option<MatchPlace>> {
+    let poses: Vec<Vec<Pose2>> =
+        runs.iter().zip(&map.runs).map(|(run, mapped)| place_observations(run, mapped)).collect();
+    let place = |stretch: &Interval| {
+        let run_idx = stretch.run_idx as usize;
+        let observations = runs.get(run_idx)?.observations;
+        let time_ns = |observation: u32| Some(observations.get(observation as usize)?.timestamp_ns);
+        let middle = stretch.first + stretch.last.saturating_sub(stretch.first) / 2;
+        Some(StretchPlace {
+            timestamps_ns: (time_ns(stretch.first)?, time_ns(stretch.last)?),
+            component: map.runs.get(run_idx)?.component,
+            map_from_middle: *poses.get(run_idx)?.get(middle as usize)?,
+        })
+    };
+    let of_match = |found: &PlaceMatch| {
+        Some(MatchPlace { earlier: place(&found.earlier)?, later: place(&found.later)? })
+    };
+    map.matches.iter().map(of_match).collect()
+}
+
 /// The digest of everything that a map is made of, the program included.
 fn digest_of(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest {
     let mut hasher = Sha256::new();
@@ -204,12 +237,12 @@ async fn map_runs(
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
     progress: &Arc<Progress>,
-) -> Result<(SiteMap, MapLabels), AppError> {
+) -> Result<MadeMap, AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
         let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
-        return Ok((map, labels));
+        return Ok(MadeMap { map, labels, match_places: Vec::new() });
     }
     let mut memo = site.registrations.take(site.store()).await?;
     let (progress, site) = (Arc::clone(progress), Arc::clone(site));
@@ -238,7 +271,8 @@ async fn map_runs(
         keep_vetoed_visible(&mut map, &decisions);
         progress.at(BuildStage::Weighing, 0.5)?;
         let labels = MapLabels::of(&records, &map, &config.semantics);
-        Ok((map, labels))
+        let match_places = match_places(&records, &map);
+        Ok(MadeMap { map, labels, match_places })
     })
     .await?
 }

@@ -7,8 +7,8 @@ use sha2::{Digest as _, Sha256};
 use crate::app::AppError;
 use crate::app::site::Site;
 use crate::records::{
-    Digest, Key, Map, MapPose, MapRecord, MapRun, MapVersion, PartKind, RunIdx, StoredLabel, append_places,
-    delete_prefixes, match_chunks, series,
+    Digest, Key, Map, MapPose, MapRecord, MapRun, MapVersion, MatchPlace, PartKind, RunIdx, StoredLabel,
+    append_places, delete_prefixes, match_chunks, series,
 };
 use crate::storage::{Batch, SiteStore, StorageError};
 
@@ -40,6 +40,7 @@ impl MapDraft {
         site: &Site,
         map: &SiteMap,
         labeled: &MapLabels,
+        match_places: &[Option<MatchPlace>],
         runs: &[WrittenRun],
         made_of: Digest,
     ) -> Result<Self, AppError> {
@@ -50,6 +51,7 @@ impl MapDraft {
             num_components: map.num_components,
             num_matches: map.matches.len() as u64,
             num_verified: map.matches.iter().filter(|found| is_verified(&found.state)).count() as u64,
+            has_match_places: true,
             made_of,
             ..MapRecord::default()
         };
@@ -85,6 +87,7 @@ impl MapDraft {
         for (key, chunk) in match_chunks(version, &map.matches).map_err(AppError::internal)? {
             values.put(key.encode(), chunk);
         }
+        series::append(&mut values, match_places, 0, |n| Key::MapPart(version, PartKind::MatchPlaces, n));
         record.content = content_of(&record, &values);
         Ok(Self { record, values })
     }

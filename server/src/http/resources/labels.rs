@@ -11,7 +11,7 @@ use crate::app::{AppError, Name};
 use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{Body, Paged, SiteOf};
-use crate::http::values::{Page, PageParams, PoseDto};
+use crate::http::values::{Page, PageParams, PoseDto, one_of, window};
 use crate::state::AppState;
 
 /// Most parts of a question.
@@ -22,6 +22,21 @@ const NUM_PARTS_MAX: usize = 16;
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct LabelParams {
+    /// Name of the run that drove them.
+    #[param(pattern = "^[A-Za-z0-9_-][A-Za-z0-9._-]*$", max_length = 64)]
+    pub run: Option<String>,
+    /// What kind of place.
+    #[param(value_type = Option<PlaceLabelDto>, inline)]
+    pub label: Option<String>,
+    /// Component of the map.
+    pub component: Option<u32>,
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres, in the map; the middle counts.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
     /// Version of the map; the serving one unless said.
     pub version: Option<u64>,
 }
@@ -203,7 +218,16 @@ pub async fn list_labels(
     SiteOf(site): SiteOf,
     Paged(params, page): Paged<LabelParams>,
 ) -> Result<Json<Page<LabelDto>>, ApiError> {
-    let labels = labels(&site.map(params.version).await?).await?;
+    let label: Option<PlaceLabelDto> = one_of("label", params.label.as_deref())?;
+    let window = window(params.from_ns, params.to_ns, params.area.as_deref())?;
+    let mut labels = labels(&site.map(params.version).await?).await?;
+    labels.retain(|driven| {
+        params.run.as_ref().is_none_or(|run| *run == driven.run)
+            && params.component.is_none_or(|component| component == driven.component)
+            && label.is_none_or(|label| label == driven.stretch.label.into())
+            && window.holds_time(driven.stretch.timestamps_ns)
+            && window.holds_place(&driven.stretch.map_from_middle.position())
+    });
     let total = labels.len();
     Ok(Json(Page::of_all(labels.into_iter().map(LabelDto::from), total, page)))
 }
