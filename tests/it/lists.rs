@@ -2,7 +2,6 @@
 
 use std::time::Duration;
 
-use futures::StreamExt;
 use locution_tests::{Api, TestServer, drive, geometry};
 use serde_json::{Value, json};
 
@@ -144,11 +143,10 @@ async fn matches_say_when_and_where_and_are_listed_by_it() {
 }
 
 /// Reads whole events of a stream until one of a kind has come: pairs of id and data.
-async fn until(response: reqwest::Response, last: &str) -> Vec<(String, Value)> {
-    let mut stream = response.bytes_stream();
+async fn until(mut response: reqwest::Response, last: &str) -> Vec<(String, Value)> {
     let (mut text, mut events) = (String::new(), Vec::new());
-    while let Some(bytes) = stream.next().await {
-        text.push_str(std::str::from_utf8(&bytes.unwrap()).unwrap());
+    while let Ok(Some(bytes)) = response.chunk().await {
+        text.push_str(std::str::from_utf8(&bytes).unwrap());
         while let Some((event, rest)) = text.split_once("\n\n") {
             let field = |name: &str| {
                 event.lines().find_map(|line| line.strip_prefix(name)).map(|value| value.trim().to_owned())
