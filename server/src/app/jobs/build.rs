@@ -16,7 +16,7 @@ use locution_engine::semantics::MapLabels;
 use locution_engine::text::{Observation, Word};
 use sha2::{Digest as _, Sha256};
 
-use crate::app::maps::{MapDraft, WrittenRun, note_made_of, serve_map};
+use crate::app::maps::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};
 use crate::app::runs::{end_deletions, pending_deletions};
 use crate::app::site::{BuildStage, Progress, Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
@@ -96,17 +96,9 @@ impl App {
             return self.stands(site, map, &deleted, progress).await;
         }
         let map = draft.write(site, started.elapsed().as_secs_f64()).await?;
-        let num_kept = state
-            .record
-            .retention
-            .num_versions
-            .map_or(self.config().builds.num_versions_kept, |num| num as usize);
-        serve_map(site, map.record.version, num_kept).await?;
-        end_deletions(site, &deleted).await?;
+        serve_map(site, map.record.version).await?;
         tell_of(site, &map);
-        // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
-        progress.at(BuildStage::Preparing, 0.0)?;
-        self.place_index(site, &map).await?;
+        self.tidy_up(site, &map, &deleted, progress).await?;
         let record = &map.record;
         let num_before = serving.map_or(0, |serving| serving.record.num_verified);
         metrics::counter!("locution_closures_total")
@@ -131,10 +123,27 @@ impl App {
         deleted: &[RunIdx],
         progress: &Progress,
     ) -> Result<String, AppError> {
-        end_deletions(site, deleted).await?;
-        progress.at(BuildStage::Preparing, 0.0)?;
-        self.place_index(site, map).await?;
+        self.tidy_up(site, map, deleted, progress).await?;
         Ok(format!("map version {} stands: nothing has changed", map.record.version))
+    }
+
+    /// What follows once a version serves: whatever need not be kept goes, and questions by example are prepared.
+    async fn tidy_up(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        map: &Map,
+        deleted: &[RunIdx],
+        progress: &Progress,
+    ) -> Result<(), AppError> {
+        let retention = site.state().record.retention;
+        let num_kept =
+            retention.num_versions.map_or(self.config().builds.num_versions_kept, |num| num as usize);
+        drop_versions(site, num_kept).await?;
+        end_deletions(site, deleted).await?;
+        // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
+        progress.tell(BuildStage::Preparing, 0.0);
+        self.place_index(site, map).await?;
+        Ok(())
     }
 
     /// Builds after some quiet, so that runs which finish together share one build.

@@ -18,4 +18,4 @@ pub use matches::{
 };
 pub use places::{find_route, places};
 pub use regions::{Topology, topology};
-pub use write::{MapDraft, WrittenRun, note_made_of, serve_map};
+pub use write::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};

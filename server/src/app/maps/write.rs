@@ -147,16 +147,23 @@ pub async fn note_made_of(site: &Site, record: &MapRecord, made_of: Digest) -> R
     Ok(site.store().commit(batch, vec![]).await?)
 }
 
-/// Makes a written version the serving one, in one step, and drops versions beyond those kept.
+/// Makes a written version the serving one, in one step.
 ///
 /// # Errors
 /// Those of the storage.
-pub async fn serve_map(site: &Site, version: MapVersion, num_kept: usize) -> Result<(), AppError> {
+pub async fn serve_map(site: &Site, version: MapVersion) -> Result<(), AppError> {
     site.change(|record, _| {
         record.map_version = version;
         Ok(())
     })
-    .await?;
+    .await
+}
+
+/// Drops the oldest versions beyond a number.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn drop_versions(site: &Site, num_kept: usize) -> Result<(), AppError> {
     let versions = site.map_versions().await?;
     for stale in &versions[..versions.len().saturating_sub(num_kept)] {
         delete_prefixes(site.store(), &Key::all_of_map(*stale)).await?;

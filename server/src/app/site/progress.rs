@@ -149,6 +149,15 @@ impl Progress {
     /// # Errors
     /// [`AppError::Stopping`] when the job has to end.
     pub fn at(&self, stage: BuildStage, share: f64) -> Result<(), AppError> {
+        self.tell(stage, share);
+        if stage.is_remembered() && self.ending() == Some(Ending::GivesWay) {
+            return Err(AppError::Stopping);
+        }
+        self.check()
+    }
+
+    /// The same where the job can no longer end without being done.
+    pub fn tell(&self, stage: BuildStage, share: f64) {
         let mut now = self.now();
         let heard_at = Instant::now();
         if let (Some(known), Some(before)) = (now.stage, now.heard_at) {
@@ -160,10 +169,6 @@ impl Progress {
         let share = before + self.shares[stage as usize] * share.clamp(0.0, 1.0);
         // After a pause it begins anew and soon is where it was.
         now.share = now.share.max(share.min(1.0));
-        if stage.is_remembered() && self.ending() == Some(Ending::GivesWay) {
-            return Err(AppError::Stopping);
-        }
-        self.check()
     }
 
     /// Whether the job may go on.
