@@ -64,17 +64,15 @@ impl App {
 
     async fn work(self: Arc<Self>, site: &Arc<Site>) {
         while let Some((job, progress)) = site.jobs().next() {
-            match self.run_job(site, job.id, &progress).await {
-                Ok(()) => {}
-                Err(AppError::Stopping) => break,
-                Err(error) => {
+            if let Err(error) = self.run_job(site, job.id, &progress).await {
+                if !matches!(error, AppError::Stopping) {
                     // The job could not even be marked: the storage is gone.
                     tracing::warn!(site = %site.name(), %error, "jobs of this site stop");
-                    break;
                 }
+                site.jobs().stop_work();
+                return;
             }
         }
-        site.jobs().stop_work();
     }
 
     /// Works on a job, in several turns when others wait, until it has ended.
@@ -106,8 +104,14 @@ impl App {
             }
             break outcome;
         };
-        // A job that waited for its first turn stands in storage as it should.
-        let Some(job) = begun else { return outcome.map(|_| ()) };
+        let Some(job) = begun else {
+            // One that waited for its first turn stands in storage as it should.
+            return if progress.ending() == Some(Ending::Stopping) {
+                Err(AppError::Stopping)
+            } else {
+                Ok(())
+            };
+        };
         end_job(site, job, progress, outcome).await
     }
 

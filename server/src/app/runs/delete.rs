@@ -64,23 +64,7 @@ impl App {
         *slot = None;
         let _making = site.making_runs.lock().await;
         let run = writer.idx;
-        let decisions = site.reader().decisions().await?;
-        let about = decisions
-            .into_iter()
-            .filter(|(_, decision)| [decision.earlier.run_idx, decision.later.run_idx].contains(&run));
-        let about: Vec<u64> = about.map(|(number, _)| number).collect();
-        site.change(|record, batch| {
-            record.num_deleted_runs += 1;
-            batch.delete(Key::RunName(name.to_string()).encode());
-            batch.put(Key::Run(run).encode(), codec::encode(&RunRecord::deleted()));
-            let head = RunHead { is_finished: true, ..RunHead::default() };
-            batch.put(Key::RunHead(run).encode(), codec::encode(&head));
-            batch.delete(Key::TextHead(record.generation, run).encode());
-            batch.put(Key::DeletedRun(run).encode(), codec::encode(&()));
-            about.iter().for_each(|number| batch.delete(Key::Decision(*number).encode()));
-            Ok(())
-        })
-        .await?;
+        make_unknown(site, run, name).await?;
         site.let_go(name);
         site.forget_texts().await;
         purge(site, run).await?;
@@ -88,6 +72,27 @@ impl App {
         site.events().tell(SiteEvent::Run { run: name.to_string(), change: RunChange::Deleted });
         Ok(())
     }
+}
+
+/// Puts an empty run in the place of one, and a note that traces of it may be left.
+async fn make_unknown(site: &Site, run: RunIdx, name: &Name) -> Result<(), AppError> {
+    let decisions = site.reader().decisions().await?;
+    let about = decisions
+        .into_iter()
+        .filter(|(_, decision)| [decision.earlier.run_idx, decision.later.run_idx].contains(&run));
+    let about: Vec<u64> = about.map(|(number, _)| number).collect();
+    site.change(|record, batch| {
+        record.num_deleted_runs += 1;
+        batch.delete(Key::RunName(name.to_string()).encode());
+        batch.put(Key::Run(run).encode(), codec::encode(&RunRecord::deleted()));
+        let head = RunHead { is_finished: true, ..RunHead::default() };
+        batch.put(Key::RunHead(run).encode(), codec::encode(&head));
+        batch.delete(Key::TextHead(record.generation, run).encode());
+        batch.put(Key::DeletedRun(run).encode(), codec::encode(&()));
+        about.iter().for_each(|number| batch.delete(Key::Decision(*number).encode()));
+        Ok(())
+    })
+    .await
 }
 
 /// Names of the finished runs that are too many, the oldest first.
@@ -212,10 +217,9 @@ mod tests {
         let (site, _) = app.make_site(&Name::new("s", "site").unwrap(), None).await.unwrap();
         let run = Name::new("r", "run").unwrap();
         crate::app::faults::drive(&app, &site, &run, 80).await;
-        // As a power cut between two commits would leave it.
-        let mut batch = Batch::default();
-        batch.put(Key::DeletedRun(0).encode(), codec::encode(&()));
-        site.store().commit(batch, vec![]).await.unwrap();
+        // As a power cut behind the first commit would leave it.
+        make_unknown(&site, 0, &run).await.unwrap();
+        assert!(!site.store().scan(&Key::all_scans(0), &[], 1).await.unwrap().is_empty());
         let job = app.queue_job(&site, JobKind::Build).await.unwrap();
         ended(&site, Some(job)).await;
         assert!(site.store().scan(&Key::all_scans(0), &[], 1).await.unwrap().is_empty());

@@ -160,6 +160,7 @@ fn as_sse(watched: &Watched) -> Event {
 /// events are kept, and begins with `missed` when some have gone or the server was started anew. The stream ends when
 /// the site is deleted or the server stops.
 #[utoipa::path(get, path = "/v1/sites/{site}/events", operation_id = "watch_site", tag = "sites",
+    params(("Last-Event-ID" = Option<String>, Header, description = "The `id` of the event that was read last")),
     responses((status = 200, description = "Events, as long as the client reads", body = EventDto,
             content_type = "text/event-stream"),
         (status = 429, description = "As many streams as the server allows are open")))]
