@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::anchors::AnchorSet;
 use super::watch::{MappingError, Span};
@@ -24,7 +25,7 @@ pub(crate) struct Request {
 type Key = (u64, u64, [i32; 5]);
 
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
     fits: HashMap<Key, Option<SubmapFit>>,
     config: Option<SubmapConfig>,

@@ -45,6 +45,8 @@ pub struct Localization {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<Hypothesis>,
+    /// Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+    pub expires_in_s: f64,
 }
 
 /// What speaks for and against a place, by the stage that found it.

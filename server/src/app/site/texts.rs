@@ -50,6 +50,18 @@ struct GrowingText {
 }
 
 impl SiteTexts {
+    /// Bytes of the indexes in memory; nothing while they are being worked on.
+    pub fn num_index_bytes(&self) -> usize {
+        let Ok(texts) = self.0.try_lock() else { return 0 };
+        let growing = texts.growing.values().filter_map(|text| text.segment.as_ref());
+        texts.finished.iter().chain(growing).map(|segment| segment.index.num_bytes()).sum()
+    }
+
+    /// Forgets what was read, since a text has gone.
+    pub async fn forget(&self) {
+        *self.0.lock().await = Texts::default();
+    }
+
     /// All texts of the serving generation as they stand, indexed.
     pub async fn segments(
         &self,
