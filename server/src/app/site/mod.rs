@@ -27,7 +27,7 @@ use crate::records::{
 };
 use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 
-pub use events::{EventId, Events, RunChange, SiteEvent, Watched, Watcher};
+pub use events::{EventId, Events, RunChange, SiteEvent, Watched};
 pub use jobs::{JobInfo, Jobs};
 pub use progress::{BuildStage, Ending, Progress};
 pub use registrations::Registrations;
