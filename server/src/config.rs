@@ -93,6 +93,8 @@ pub struct LimitsConfig {
     /// Most localisations at once.
     #[serde(alias = "num_localisations_max")]
     pub num_localizations_max: usize,
+    /// Memory for the indexes of the texts of all sites, bytes; those asked for least lately make way and are read again.
+    pub text_index_bytes_max: usize,
     /// Most streams of events at once; more are refused with 429.
     pub num_event_streams_max: usize,
     /// Longest a request may take, seconds.
@@ -121,6 +123,7 @@ impl Default for LimitsConfig {
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localizations_max: 32,
+            text_index_bytes_max: 256 << 20,
             num_event_streams_max: 64,
             request_timeout_s: 600,
         }

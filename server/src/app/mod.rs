@@ -53,7 +53,7 @@ use ask::{Localizations, PlaceIndexes};
 use jobs::Turns;
 use maps::GridKey;
 use runs::OpenRuns;
-use site::Site;
+use site::{Site, TextBudget};
 
 /// Grids kept in memory; each has at most 64 million cells of one byte.
 const NUM_GRIDS_KEPT: NonZeroUsize = NonZeroUsize::new(4).expect("four is not zero");
@@ -77,6 +77,7 @@ pub struct App {
     served_maps: tokio::sync::Mutex<LruCache<GridKey, Arc<ServedMap>>>,
     localizations: Localizations,
     place_indexes: PlaceIndexes,
+    text_budget: Arc<TextBudget>,
     /// Streams of events that may be open at once.
     event_slots: Arc<Semaphore>,
     /// Set when the server ends: jobs give way.
@@ -95,6 +96,7 @@ impl App {
             served_maps: tokio::sync::Mutex::new(LruCache::new(NUM_GRIDS_KEPT)),
             localizations: Localizations::default(),
             place_indexes: PlaceIndexes::default(),
+            text_budget: Arc::new(TextBudget::new(config.limits.text_index_bytes_max)),
             event_slots: Arc::new(Semaphore::new(config.limits.num_event_streams_max)),
             stop: CancellationToken::new(),
             config,

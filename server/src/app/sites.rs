@@ -102,7 +102,9 @@ impl App {
             return Err(AppError::not_found("site", name));
         }
         let store = self.storage.open(name.as_str()).await?;
-        let site = Site::open(name, store, self.stop.child_token(), new_birth()?).await?;
+        let site =
+            Site::open(name, store, Arc::clone(&self.text_budget), self.stop.child_token(), new_birth()?)
+                .await?;
         let site = Arc::new(site);
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
         self.work_on(&site);
@@ -209,6 +211,30 @@ mod tests {
     use super::*;
     use crate::config::ServerConfig;
     use crate::storage::{MemoryStorage, Storage};
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn indexes_that_nobody_asks_for_make_way_and_come_back() {
+        use crate::app::ask::find_words;
+        let storage: Arc<dyn Storage> = Arc::new(MemoryStorage::default());
+        let mut config = ServerConfig::default();
+        config.limits.text_index_bytes_max = 1;
+        config.builds.is_automatic = false;
+        let app = Arc::new(App::new(config, storage));
+        let mut sites = Vec::new();
+        for name in ["a", "b"] {
+            let (site, _) = app.make_site(&Name::new(name, "site").unwrap(), None).await.unwrap();
+            crate::app::faults::drive(&app, &site, &Name::new("r", "run").unwrap(), 240).await;
+            sites.push(site);
+        }
+        let pattern = [locution_engine::index::WordPattern::default()];
+        let ask = async |site: &Arc<Site>| format!("{:?}", find_words(site, &pattern, 9).await.unwrap());
+        let answer = ask(&sites[0]).await;
+        assert!(answer.contains("fit") && sites[0].num_index_bytes() > 0);
+        ask(&sites[1]).await;
+        assert_eq!(sites[0].num_index_bytes(), 0, "it made way for the other");
+        assert!(sites[1].num_index_bytes() > 0, "whoever was asked last stays");
+        assert_eq!(ask(&sites[0]).await, answer);
+    }
 
     #[tokio::test]
     async fn a_site_made_again_is_another_one_and_a_reopened_one_the_same() {

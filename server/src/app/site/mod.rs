@@ -9,6 +9,7 @@ mod progress;
 mod registrations;
 mod run_writer;
 mod state;
+mod text_budget;
 mod texts;
 mod translation;
 
@@ -33,7 +34,9 @@ pub use progress::{BuildStage, Ending, Progress};
 pub use registrations::Registrations;
 pub use run_writer::{RunWriter, WriterState};
 pub use state::{SiteState, TextConfig};
-pub use texts::{Segment, SiteTexts};
+pub use text_budget::TextBudget;
+pub use texts::Segment;
+use texts::SiteTexts;
 pub use translation::RunTranslator;
 
 /// A site that is open.
@@ -52,7 +55,8 @@ pub struct Site {
     pub(in crate::app) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
     pub(in crate::app) registrations: Registrations,
-    texts: SiteTexts,
+    texts: Arc<SiteTexts>,
+    text_budget: Arc<TextBudget>,
     /// Set when the site is deleted or the server ends: jobs give way.
     pub(in crate::app) stop: CancellationToken,
 }
@@ -89,6 +93,7 @@ impl Site {
     pub(in crate::app) async fn open(
         name: &Name,
         store: Arc<dyn SiteStore>,
+        text_budget: Arc<TextBudget>,
         stop: CancellationToken,
         birth_if_none: u64,
     ) -> Result<Self, AppError> {
@@ -106,7 +111,8 @@ impl Site {
             serving: tokio::sync::RwLock::default(),
             build_requests: AtomicU64::new(0),
             registrations: Registrations::default(),
-            texts: SiteTexts::default(),
+            texts: Arc::default(),
+            text_budget,
             stop,
         };
         if is_outdated {
@@ -309,7 +315,9 @@ impl Site {
 
     /// All texts as they stand, indexed.
     pub(in crate::app) async fn text_segments(&self) -> Result<Vec<Arc<Segment>>, AppError> {
-        self.texts.segments(&self.store, &self.state().record).await
+        let segments = self.texts.segments(&self.store, &self.state().record).await?;
+        self.text_budget.used(&self.texts);
+        Ok(segments)
     }
 
     /// What it holds, counted over the heads of its runs.
