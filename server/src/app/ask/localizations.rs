@@ -8,7 +8,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
-use locution_engine::locate::{LocalizationEstimate, LocalizationState, PosePrior, ServedMap, SessionMap, SiteSession};
+use locution_engine::locate::{
+    LocalizationEstimate, LocalizationState, PosePrior, ServedMap, SessionMap, SiteSession,
+};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
 
