@@ -270,6 +270,11 @@ async fn a_site_can_be_changed_and_a_run_forgotten() {
         let answer = api.get(&format!("/v1/sites/a/{path}")).await;
         assert!(answer.status == 200 && !answer.text().contains("\"old\""), "{path}: {}", answer.text());
     }
+    assert_eq!(
+        api.get("/v1/sites/a/map/grid").await.status,
+        200,
+        "the first component is that of a run that is there"
+    );
     let query = json!({"words": [{}], "limit": 100});
     let places = api.post("/v1/sites/a/queries/words", &query).await.ok();
     assert!(

@@ -1,5 +1,6 @@
 //! Building the map of a site in the background: load a snapshot, let the engine map it, write a version, serve it.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -180,6 +181,25 @@ fn written_run(run: &LoadedRun) -> WrittenRun {
     }
 }
 
+/// Numbers components anew, those of runs that drove first: component 0 is what is shown unless another is asked for, and
+/// must not be that of a run that has sent nothing or was deleted.
+fn number_driven_first(runs: &[RunRecord<'_>], map: &mut SiteMap) {
+    let mut numbers = BTreeMap::new();
+    for is_driven in [true, false] {
+        for (_, mapped) in runs.iter().zip(&map.runs).filter(|(run, _)| run.keyframes.is_empty() != is_driven)
+        {
+            let next = numbers.len() as u32;
+            numbers.entry(mapped.component).or_insert(next);
+        }
+        if is_driven {
+            map.num_components = numbers.len() as u32;
+        }
+    }
+    for mapped in &mut map.runs {
+        mapped.component = numbers[&mapped.component];
+    }
+}
+
 /// A vetoed pair of places that the map no longer brings together stays listed, so that it can be taken back.
 fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
     for decision in decisions.iter().filter(|decision| !decision.is_same_place) {
@@ -275,6 +295,7 @@ async fn map_runs(
             MappingError::Graph(error) => AppError::internal(error),
         })?;
         progress.at(BuildStage::Weighing, 0.0)?;
+        number_driven_first(&records, &mut map);
         weigh_texts(&records, &mut map, &config.matching);
         map.matches.append(&mut map.refused);
         keep_vetoed_visible(&mut map, &decisions);
