@@ -93,6 +93,10 @@ pub struct LimitsConfig {
     /// Most localisations at once.
     #[serde(alias = "num_localisations_max")]
     pub num_localizations_max: usize,
+    /// Memory for the indexes of the texts of all sites, bytes; those asked for least lately make way and are read again.
+    pub text_index_bytes_max: usize,
+    /// Most streams of events at once; more are refused with 429.
+    pub num_event_streams_max: usize,
     /// Longest a request may take, seconds.
     pub request_timeout_s: u64,
 }
@@ -119,6 +123,8 @@ impl Default for LimitsConfig {
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localizations_max: 32,
+            text_index_bytes_max: 256 << 20,
+            num_event_streams_max: 64,
             request_timeout_s: 600,
         }
     }
@@ -150,13 +156,16 @@ pub struct BuildsConfig {
     pub settle_s: f64,
     /// Most builds at once, over all sites.
     pub num_builds_max: usize,
+    /// How long a build may go on while builds of other sites wait, seconds; then it lets them pass and goes on when its
+    /// turn comes again, for twice as long.
+    pub turn_s: f64,
     /// Map versions kept per site, the serving one included.
     pub num_versions_kept: usize,
 }
 
 impl Default for BuildsConfig {
     fn default() -> Self {
-        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 1, num_versions_kept: 5 }
+        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 2, turn_s: 5.0, num_versions_kept: 5 }
     }
 }
 
@@ -335,6 +344,9 @@ impl ServerConfig {
         }
         if !(self.builds.settle_s >= 0.0 && self.builds.settle_s <= 86_400.0) {
             return invalid("builds.settle_s", "must lie between 0 and 86400 seconds");
+        }
+        if !(self.builds.turn_s > 0.0 && self.builds.turn_s <= 86_400.0) {
+            return invalid("builds.turn_s", "must lie above 0 and at most at 86400 seconds");
         }
         for (idx, origin) in self.web.origins.iter().enumerate() {
             let is_origin = origin.split_once("://").is_some_and(|(scheme, host)| {

@@ -162,6 +162,10 @@ impl From<AppError> for ApiError {
                 Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
                     .retry_after(retry_after.as_secs().max(1))
             }
+            AppError::Stopping => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "stopping", "The server stops", detail)
+                    .retry_after(5)
+            }
             AppError::Storage(error) => Self::from(error),
             AppError::Internal { what } => {
                 tracing::error!(what, "internal error");

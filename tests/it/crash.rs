@@ -50,17 +50,19 @@ impl Process {
         self.child.id()
     }
 
-    /// SIGTERM, as whoever looks after services sends it; how it ended, and after how long.
-    pub(crate) async fn terminate(&mut self) -> (std::process::ExitStatus, Duration) {
-        let asked = std::time::Instant::now();
-        let told = Command::new("kill").args(["-TERM", &self.id().to_string()]).status().unwrap();
+    /// SIGTERM: it may end in order, within the time given.
+    #[cfg(unix)]
+    pub(crate) fn terminate(mut self, time_max: Duration) -> std::process::ExitStatus {
+        let told = Command::new("kill").args(["-s", "TERM", &self.id().to_string()]).status().unwrap();
         assert!(told.success());
-        loop {
+        let told_at = std::time::Instant::now();
+        while told_at.elapsed() < time_max {
             if let Some(status) = self.child.try_wait().unwrap() {
-                return (status, asked.elapsed());
+                return status;
             }
-            tokio::time::sleep(Duration::from_millis(20)).await;
+            std::thread::sleep(Duration::from_millis(50));
         }
+        panic!("it did not end");
     }
 
     /// SIGKILL: no destructor, no flush, no goodbye.

@@ -12,6 +12,8 @@ mod disk_full;
 mod documentation;
 mod fuzz;
 mod headers;
+mod jobs;
+mod lists;
 mod maps;
 mod memory;
 mod power_cut;

@@ -61,6 +61,9 @@ pub enum AppError {
         /// When to ask again.
         retry_after: Duration,
     },
+    /// The work was ended before it was done: the server stops, its site is deleted, or somebody cancelled it.
+    #[error("this was ended before it was done, since the server stops or the site is deleted")]
+    Stopping,
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// A bug of ours.
@@ -85,11 +88,6 @@ impl AppError {
     /// Something that does not exist.
     pub fn not_found(kind: &'static str, name: impl ToString) -> Self {
         Self::NotFound { kind, name: name.to_string() }
-    }
-
-    /// The server is on its way out.
-    pub fn stopping() -> Self {
-        Self::Busy { queue: "the server, which is stopping,", retry_after: Duration::from_secs(5) }
     }
 
     /// A bug of ours.

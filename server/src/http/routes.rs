@@ -5,8 +5,8 @@ use utoipa_axum::routes;
 
 use super::forms;
 use super::resources::{
-    backups, batches, changes, jobs, keys, labels, localizations, maps, matches, operations, places, runs,
-    sites, texts, word_queries,
+    backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches, operations, places,
+    runs, sites, texts, word_queries,
 };
 use crate::auth::{Rule, Ruled};
 use crate::config::Scope;
@@ -28,12 +28,13 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(ADMIN, routes!(keys::revoke_key))
         .ruled(READ, routes!(sites::list_sites))
         .ruled(READ, routes!(sites::get_site))
-        .ruled(ADMIN, routes!(sites::make_site, sites::delete_site))
+        .ruled(ADMIN, routes!(sites::make_site, sites::change_site, sites::delete_site))
         .ruled(ADMIN, routes!(backups::backup_site))
         .ruled(ADMIN.with_stream(), routes!(backups::restore_site))
+        .ruled(READ, routes!(events::watch_site))
         .ruled(READ, routes!(runs::list_runs))
         .ruled(READ, routes!(runs::get_run))
-        .ruled(WRITE, routes!(runs::make_run))
+        .ruled(WRITE, routes!(runs::make_run, runs::delete_run))
         .ruled(WRITE, routes!(runs::finish_run))
         .ruled(WRITE.with_scans(), routes!(batches::append_batch))
         .ruled(READ, routes!(batches::list_scans))
@@ -44,6 +45,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(WRITE, routes!(jobs::build_map))
         .ruled(READ, routes!(jobs::list_jobs))
         .ruled(READ, routes!(jobs::get_job))
+        .ruled(WRITE, routes!(jobs::cancel_job))
         .ruled(READ, routes!(matches::list_matches))
         .ruled(READ, routes!(matches::get_match))
         .ruled(WRITE, routes!(matches::decide_match, matches::undecide_match))
@@ -56,7 +58,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(READ, routes!(forms::get_map_tum))
         .ruled(READ, routes!(forms::get_picture_png))
         .ruled(READ, routes!(forms::get_picture_svg))
-        .ruled(READ, routes!(localizations::open_localization))
+        .ruled(READ, routes!(localizations::list_localizations, localizations::open_localization))
         .ruled(READ, routes!(localizations::get_localization, localizations::close_localization))
         .ruled(READ.with_scans(), routes!(localizations::localize))
         .ruled(READ.with_scans(), routes!(localizations::query_example))
@@ -64,6 +66,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(READ, routes!(word_queries::query_words_everywhere))
         .ruled(READ, routes!(labels::list_labels))
         .ruled(READ, routes!(labels::query_labels))
+        .ruled(READ, routes!(labels::query_labels_everywhere))
         .ruled(READ, routes!(places::list_places))
         .ruled(READ, routes!(places::get_route))
         .ruled(READ, routes!(changes::list_changes))

@@ -8,13 +8,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
-use locution_engine::locate::{LocalizationEstimate, PosePrior, ServedMap, SessionMap, SiteSession};
+use locution_engine::locate::{
+    LocalizationEstimate, LocalizationState, PosePrior, ServedMap, SessionMap, SiteSession,
+};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
 
 use super::examples::invalid_geometry;
 use crate::app::runs::NewBatch;
-use crate::app::site::Site;
+use crate::app::site::{Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
 use crate::records::Map;
 
@@ -34,6 +36,8 @@ pub struct LocalizationInfo {
     pub next_sequence: u64,
     /// What it says.
     pub estimate: LocalizationEstimate,
+    /// It is forgotten when it gets no scans for so long.
+    pub expires_in: Duration,
 }
 
 /// The sessions of this process.
@@ -55,6 +59,8 @@ struct Session {
     geometry: ScanGeometry,
     map_version: u64,
     latest_use: Mutex<Instant>,
+    /// The state that those who watch were told.
+    told: Mutex<Option<LocalizationState>>,
     search: tokio::sync::Mutex<Search>,
 }
 
@@ -97,6 +103,7 @@ impl App {
             geometry,
             map_version: map.record.version,
             latest_use: Mutex::new(Instant::now()),
+            told: Mutex::new(None),
             search: tokio::sync::Mutex::new(search),
         };
         let id =
@@ -109,13 +116,25 @@ impl App {
     /// # Errors
     /// [`AppError::NotFound`].
     pub async fn localization(&self, site: &Site, id: u64) -> Result<LocalizationInfo, AppError> {
-        let session = self.session(site, id)?;
-        let search = session.search.lock().await;
-        let estimating = search.clone();
-        let next_sequence = search.next_sequence;
-        drop(search);
-        let estimate = on_blocking_thread(move || estimating.session.estimate()).await?;
-        Ok(LocalizationInfo { id, map_version: session.map_version, next_sequence, estimate })
+        info(id, &*self.session(site, id)?).await
+    }
+
+    /// The answers of all sessions in a site, the oldest first; looking at them keeps none of them open.
+    ///
+    /// # Errors
+    /// [`AppError::Internal`].
+    pub async fn localizations(&self, site: &Site) -> Result<Vec<LocalizationInfo>, AppError> {
+        let of_site = |session: &Session| session.site == site.birth() && session.idle_for() < IDLE_MAX;
+        let sessions: Vec<(u64, Arc<Session>)> = {
+            let table = self.localizations.table();
+            let sessions = table.sessions.iter().filter(|(_, session)| of_site(session));
+            sessions.map(|(id, session)| (*id, Arc::clone(session))).collect()
+        };
+        let mut infos = Vec::new();
+        for (id, session) in sessions {
+            infos.push(info(id, &session).await?);
+        }
+        Ok(infos)
     }
 
     /// Feeds a session. Scans it has seen are passed over; a gap is refused.
@@ -145,7 +164,14 @@ impl App {
         })
         .await?;
         drop(search);
-        self.localization(site, id).await
+        let info = info(id, &session).await?;
+        let mut told = session.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = info.estimate.state;
+        if told.replace(state) != Some(state) {
+            site.events().tell(SiteEvent::Localization { id, state });
+        }
+        drop(told);
+        Ok(info)
     }
 
     /// Closes a session.
@@ -213,6 +239,22 @@ impl App {
         served_maps.put(key, Arc::clone(&served));
         Ok(served)
     }
+}
+
+/// The answer of a session as it stands.
+async fn info(id: u64, session: &Session) -> Result<LocalizationInfo, AppError> {
+    let search = session.search.lock().await;
+    let estimating = search.clone();
+    let next_sequence = search.next_sequence;
+    drop(search);
+    let estimate = on_blocking_thread(move || estimating.session.estimate()).await?;
+    Ok(LocalizationInfo {
+        id,
+        map_version: session.map_version,
+        next_sequence,
+        estimate,
+        expires_in: IDLE_MAX.saturating_sub(session.idle_for()),
+    })
 }
 
 impl Localizations {

@@ -19,8 +19,8 @@ use crate::app::ask::{ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::error::ApiError;
-use crate::extract::{Body, IdOf, SiteOf};
-use crate::http::values::{ChannelDto, DirectionDto, PoseDto};
+use crate::extract::{Body, IdOf, NoParams, Paged, SiteOf};
+use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto};
 use crate::http::with_location;
 use crate::state::AppState;
 
@@ -148,6 +148,9 @@ pub struct LocalizationDto {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<HypothesisDto>,
+    /// Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+    #[schema(minimum = 0)]
+    pub expires_in_s: f64,
     /// Probability that the robot is not in this map; with those of all places 1.
     #[schema(minimum = 0, maximum = 1)]
     pub probability_elsewhere: f64,
@@ -171,6 +174,7 @@ impl From<LocalizationInfo> for LocalizationDto {
             probability_elsewhere: estimate.probability_elsewhere,
             missing: estimate.missing.into_iter().map(MissingDto::from).collect(),
             prior_agrees: estimate.prior_agrees,
+            expires_in_s: info.expires_in.as_secs_f64(),
         }
     }
 }
@@ -324,6 +328,20 @@ pub async fn open_localization(
     let info = state.app.open_localization(&site, geometry, prior, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
+}
+
+/// All localisations that are open in the site, the oldest first. Listing them keeps none of them open.
+#[utoipa::path(get, path = "/v1/sites/{site}/localisations", operation_id = "list_localizations", tag = "localization",
+    params(PageParams),
+    responses((status = 200, description = "A page of localisations", body = Page<LocalizationDto>)))]
+pub async fn list_localizations(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    Paged(NoParams {}, page): Paged<NoParams>,
+) -> Result<Json<Page<LocalizationDto>>, ApiError> {
+    let infos = state.app.localizations(&site).await?;
+    let total = infos.len();
+    Ok(Json(Page::of_all(infos.into_iter().map(LocalizationDto::from), total, page)))
 }
 
 /// The answer as it stands.

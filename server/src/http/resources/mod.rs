@@ -4,6 +4,7 @@
 pub(super) mod backups;
 pub(super) mod batches;
 pub(super) mod changes;
+pub(super) mod events;
 pub(super) mod jobs;
 pub(super) mod keys;
 pub(super) mod labels;
