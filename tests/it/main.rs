@@ -10,7 +10,6 @@ mod crash;
 mod damage;
 mod disk_full;
 mod documentation;
-mod fuzz;
 mod headers;
 mod jobs;
 mod lists;
