@@ -214,7 +214,7 @@ async fn what_happens_is_told_as_it_happens_and_again_to_whoever_comes_back() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn localisations_are_listed_with_their_expiry() {
+async fn localizations_are_listed_with_their_expiry() {
     let server = TestServer::start().await;
     let api = &server.api;
     post_run(api, "r", 400, 1).await;
