@@ -19,7 +19,7 @@ use utoipa_swagger_ui::SwaggerUi;
 use crate::auth;
 use crate::error::ApiError;
 use crate::http::routes::routes;
-use crate::http::{nanoseconds, openapi, with_version};
+use crate::http::{nanoseconds, openapi, page, with_version};
 use crate::state::AppState;
 
 /// The service: routes, documentation, limits, keys.
@@ -33,6 +33,7 @@ pub fn build_router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(state.clone(), guard))
         .with_state(state)
         .route("/", get(async || Redirect::temporary("/ui")))
+        .route("/ui/{file}", get(page::file))
         .route("/openapi.json", get(document))
         .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
         .fallback(async || ApiError::not_found("there is no such path; see /docs"))

@@ -3,7 +3,7 @@
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::forms;
+use super::{forms, page};
 use super::resources::{
     backups, batches, changes, jobs, labels, localizations, maps, matches, operations, places, runs, sites,
     texts, word_queries,
@@ -16,7 +16,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .routes(routes!(operations::healthz))
         .routes(routes!(operations::readyz))
         .routes(routes!(operations::metrics))
-        .routes(routes!(operations::ui))
+        .routes(routes!(page::ui))
         .routes(routes!(sites::list_sites))
         .routes(routes!(sites::make_site, sites::get_site, sites::delete_site))
         .routes(routes!(backups::backup_site, backups::restore_site))
