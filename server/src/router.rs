@@ -21,7 +21,7 @@ use crate::auth;
 use crate::config::WebConfig;
 use crate::error::ApiError;
 use crate::http::routes::routes;
-use crate::http::{nanoseconds, openapi, with_version};
+use crate::http::{nanoseconds, openapi, page, with_version};
 use crate::intake;
 use crate::observe::{REQUEST_ID, observe};
 use crate::state::AppState;
@@ -37,6 +37,7 @@ pub fn build_router(state: AppState) -> Router {
         .layer(middleware::from_fn_with_state(Arc::clone(&state.gate), auth::identify))
         .with_state(state)
         .route("/", get(async || Redirect::temporary("/ui")))
+        .route("/ui/{file}", get(page::file))
         .route("/openapi.json", get(document))
         .merge(SwaggerUi::new("/docs").config(utoipa_swagger_ui::Config::from("/openapi.json")))
         .fallback(async || ApiError::not_found("there is no such path; see /docs"))

@@ -98,6 +98,28 @@ async fn what_was_sent_can_be_read_back() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn the_page_loads_only_what_this_server_has() {
+    let server = TestServer::start().await;
+    let html = server.api.get("/ui").await.text();
+    let linked: Vec<&str> = html.split(['"', '\'']).filter(|text| text.starts_with("/ui/")).collect();
+    assert!(linked.len() >= 3, "style, script and icon: {linked:?}");
+    assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("<style"), "{html}");
+    let client = reqwest::Client::new();
+    for path in linked.into_iter().chain(["/ui"]) {
+        let answer = client.get(format!("{}{path}", server.api.base)).send().await.unwrap();
+        assert_eq!(answer.status(), 200, "{path}");
+        let header = |name: &str| answer.headers()[name].to_str().unwrap().to_owned();
+        let policy = header("content-security-policy");
+        assert!(policy.starts_with("default-src 'none'") && !policy.contains("unsafe"), "{policy}");
+        assert_eq!(header("x-content-type-options"), "nosniff");
+        let known = client.get(format!("{}{path}", server.api.base)).header("if-none-match", header("etag"));
+        assert_eq!(known.send().await.unwrap().status(), 304, "{path} is not sent twice");
+    }
+    server.api.get("/ui/config.toml").await.problem(404, "not-found");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn operations_answer() {
     let server = TestServer::start().await;
     let api = &server.api;

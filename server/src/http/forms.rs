@@ -76,7 +76,7 @@ impl MapAt {
 }
 
 /// Whether a client says that it has what a tag names; weak tags and lists of them count.
-fn is_known(headers: &HeaderMap, tag: &str) -> bool {
+pub(super) fn is_known(headers: &HeaderMap, tag: &str) -> bool {
     let known = headers.get_all(header::IF_NONE_MATCH).into_iter().filter_map(|value| value.to_str().ok());
     known
         .flat_map(|list| list.split(','))

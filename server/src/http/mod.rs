@@ -7,11 +7,12 @@
 //! ```
 //!
 //! `resources` holds a file per resource: its parameters, its bodies, its handlers. `forms` holds the map in the
-//! formats of other tools.
+//! formats of other tools, `page` the files of the page under `/ui`.
 
 mod forms;
 pub(crate) mod nanoseconds;
 pub mod openapi;
+pub(crate) mod page;
 mod ranges;
 pub(crate) mod resources;
 pub(crate) mod routes;

@@ -3,7 +3,7 @@
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::forms;
+use super::{forms, page};
 use super::resources::{
     backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches, operations, places,
     runs, sites, texts, word_queries,
@@ -22,7 +22,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(OPEN, routes!(operations::healthz))
         .ruled(OPEN, routes!(operations::readyz))
         .ruled(READ.at_once(), routes!(operations::metrics))
-        .ruled(OPEN, routes!(operations::ui))
+        .ruled(OPEN, routes!(page::ui))
         .ruled(ADMIN, routes!(keys::list_keys, keys::make_key))
         .ruled(ADMIN, routes!(keys::rotate_key))
         .ruled(ADMIN, routes!(keys::revoke_key))

@@ -1,7 +1,7 @@
 //! For those who run the server: health, readiness, metrics.
 
 use axum::extract::State;
-use axum::response::{Html, Response};
+use axum::response::Response;
 
 use crate::error::ApiError;
 use crate::http::text;
@@ -21,13 +21,6 @@ pub async fn healthz() -> Response {
 pub async fn readyz(State(state): State<AppState>) -> Result<Response, ApiError> {
     state.app.check_ready().await?;
     Ok(text("ready\n".into()))
-}
-
-/// A page to look at sites, runs and maps; one file, nothing is loaded from elsewhere.
-#[utoipa::path(get, path = "/ui", operation_id = "get_ui", tag = "operations",
-    responses((status = 200, description = "The page", body = String, content_type = "text/html")))]
-pub async fn ui() -> Html<&'static str> {
-    Html(include_str!("../../../assets/ui.html"))
 }
 
 /// Counters and histograms in Prometheus' text format.
