@@ -3,11 +3,11 @@
 use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
-use super::{forms, page};
 use super::resources::{
     backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches, operations, places,
     runs, sites, texts, word_queries,
 };
+use super::{forms, page};
 use crate::auth::{Rule, Ruled};
 use crate::config::Scope;
 use crate::state::AppState;
