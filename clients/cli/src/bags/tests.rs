@@ -227,7 +227,7 @@ fn topics_are_chosen_or_asked_for() {
     topics.push(("/rear", topics[0].1, topics[0].2.clone()));
     assert!(read(&topics, &BagOptions::default()).unwrap().notes[0].starts_with("/scan "));
     topics[0].0 = "/front";
-    let error = |options| format!("{:#}", read(&topics, options).err().unwrap());
+    let error = |options: &BagOptions| format!("{:#}", read(&topics, options).err().unwrap());
     assert!(error(&BagOptions::default()).contains("/front, /rear; choose one with --scan-topic"));
     let nose = BagOptions { scan_topic: Some("/nose".into()), ..BagOptions::default() };
     assert!(error(&nose).contains("no laser topic /nose; the bag has /front, /rear"));

@@ -44,6 +44,7 @@ from .map_statistics import MapStatistics
 from .match import Match
 from .match_page import MatchPage
 from .match_state import MatchState
+from .missing import Missing
 from .new_localization import NewLocalization
 from .new_run import NewRun
 from .new_site import NewSite
@@ -55,6 +56,7 @@ from .place_label import PlaceLabel
 from .place_page import PlacePage
 from .point import Point
 from .pose import Pose
+from .pose_prior import PosePrior
 from .problem import Problem
 from .receipt import Receipt
 from .region import Region
@@ -129,6 +131,7 @@ __all__ = (
     "Match",
     "MatchPage",
     "MatchState",
+    "Missing",
     "NewLocalization",
     "NewRun",
     "NewSite",
@@ -140,6 +143,7 @@ __all__ = (
     "PlacePage",
     "Point",
     "Pose",
+    "PosePrior",
     "Problem",
     "Receipt",
     "Region",
