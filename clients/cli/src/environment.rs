@@ -91,32 +91,4 @@ mod tests {
         assert!(told.contains("did you mean LOCUTION_LIMITS__NUM_BATCHES_MAX?"), "{told}");
         assert!(!warning("LOCUTION_QQQ", &known).unwrap().contains("did you mean"));
     }
-    #[test]
-    fn the_page_of_the_configuration_names_every_key_with_its_default() {
-        let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/configuration.md");
-        let page = std::fs::read_to_string(path).unwrap();
-        let row = |line: &'_ str| {
-            let (key, rest) = line.strip_prefix("| `")?.split_once("` | `")?;
-            Some((key.to_owned(), rest.split_once('`')?.0.to_owned()))
-        };
-        let written: std::collections::BTreeMap<String, String> = page.lines().filter_map(row).collect();
-        let mut known = std::collections::BTreeMap::new();
-        add_leaves(&Value::try_from(ServerConfig::default()).unwrap(), String::new(), &mut known);
-        assert_eq!(written, known);
-    }
-
-    /// Keys by their path, with their values as TOML.
-    fn add_leaves(value: &Value, path: String, leaves: &mut std::collections::BTreeMap<String, String>) {
-        match value {
-            Value::Table(table) => {
-                let separator = if path.is_empty() { "" } else { "." };
-                for (key, value) in table {
-                    add_leaves(value, format!("{path}{separator}{key}"), leaves);
-                }
-            }
-            value => {
-                leaves.insert(path, value.to_string().trim_matches('"').to_owned());
-            }
-        }
-    }
 }
