@@ -28,6 +28,7 @@ class Localization:
         next_sequence (int): The sequence number to send next.
         travel_m (float): Metres driven since it began.
         hypotheses (list[Hypothesis]): Likeliest first.
+        expires_in_s (float): Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
         probability_elsewhere (float): Probability that the robot is not in this map; with those of all places 1.
         missing (list[Missing]): What is missing to be `converged`; empty when it is.
         prior_agrees (bool | None | Unset): Whether the likeliest place is the one that was declared; absent without a
@@ -40,6 +41,7 @@ class Localization:
     next_sequence: int
     travel_m: float
     hypotheses: list[Hypothesis]
+    expires_in_s: float
     probability_elsewhere: float
     missing: list[Missing]
     prior_agrees: bool | None | Unset = UNSET
@@ -60,6 +62,8 @@ class Localization:
         for hypotheses_item_data in self.hypotheses:
             hypotheses_item = hypotheses_item_data.to_dict()
             hypotheses.append(hypotheses_item)
+
+        expires_in_s = self.expires_in_s
 
         probability_elsewhere = self.probability_elsewhere
 
@@ -84,6 +88,7 @@ class Localization:
                 "next_sequence": next_sequence,
                 "travel_m": travel_m,
                 "hypotheses": hypotheses,
+                "expires_in_s": expires_in_s,
                 "probability_elsewhere": probability_elsewhere,
                 "missing": missing,
             }
@@ -115,6 +120,8 @@ class Localization:
 
             hypotheses.append(hypotheses_item)
 
+        expires_in_s = d.pop("expires_in_s")
+
         probability_elsewhere = d.pop("probability_elsewhere")
 
         missing = []
@@ -140,6 +147,7 @@ class Localization:
             next_sequence=next_sequence,
             travel_m=travel_m,
             hypotheses=hypotheses,
+            expires_in_s=expires_in_s,
             probability_elsewhere=probability_elsewhere,
             missing=missing,
             prior_agrees=prior_agrees,
