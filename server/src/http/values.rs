@@ -3,7 +3,7 @@
 use locution_engine::geometry::{Point2, Pose2};
 use locution_engine::mapping::Direction;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::{Area, Window};
@@ -164,9 +164,29 @@ impl PageParams {
         if !(1..=NUM_ITEMS_MAX).contains(&limit) {
             return Err(ApiError::invalid("limit", format!("a page has 1 to {NUM_ITEMS_MAX} items")));
         }
-        let first = self.cursor.as_ref().map_or(Ok(0), |cursor| cursor.parse());
-        let first = first.map_err(|_| ApiError::invalid("cursor", "no page has given this cursor"))?;
+        let first = match &self.cursor {
+            None => 0,
+            Some(cursor) => parse_cursor(cursor)
+                .ok_or_else(|| ApiError::invalid("cursor", "no page has given this cursor"))?,
+        };
         Ok(PageBounds { first, limit })
+    }
+}
+
+/// A cursor is a number as pages write it: digits, no more than a number of 63 bits has.
+fn parse_cursor(cursor: &str) -> Option<u64> {
+    let is_written_by_a_page = cursor.len() <= 19 && cursor.bytes().all(|byte| byte.is_ascii_digit());
+    if is_written_by_a_page { cursor.parse().ok() } else { None }
+}
+
+/// A version in a query; numbers that no version has are told, whether or not the answer depends on it.
+pub(crate) fn version_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+    let version = Option::<u64>::deserialize(deserializer)?;
+    match version {
+        Some(version) if i64::try_from(version).is_err() => {
+            Err(serde::de::Error::custom("the number is too large"))
+        }
+        _ => Ok(version),
     }
 }
 

@@ -162,8 +162,12 @@ fn type_answers(operation: &mut Node) {
         let content = response.get_mut("content").and_then(Node::members);
         for (media_type, body) in content.into_iter().flatten() {
             let is_binary = media_type.starts_with("image/") && media_type != "image/svg+xml";
-            if is_binary && let Some(body) = body.members() {
+            let Some(body) = body.members() else { continue };
+            if is_binary {
                 body.insert("schema".into(), node!({"type": "string", "format": "binary"}));
+            } else if media_type == "application/yaml" {
+                // A schema speaks of what the YAML says, not of its text.
+                body.insert("schema".into(), node!({"type": "object"}));
             }
         }
     }

@@ -57,6 +57,7 @@ impl ScanDto {
 pub struct BatchDto {
     /// Sequence number of the first scan; the first scan of a run has 0.
     #[schema(example = 0)]
+    #[serde(deserialize_with = "crate::http::whole::deserialize")]
     pub first_sequence: u64,
     /// In order.
     pub scans: Vec<ScanDto>,

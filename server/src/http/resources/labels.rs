@@ -38,6 +38,7 @@ pub struct LabelParams {
     #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
     pub area: Option<String>,
     /// Version of the map; the serving one unless said.
+    #[serde(default, deserialize_with = "crate::http::values::version_number")]
     pub version: Option<u64>,
 }
 
@@ -152,6 +153,7 @@ pub struct LabelQueryDto {
     pub labels: Vec<LabelPatternDto>,
     /// Most places to answer; 20 unless said.
     #[schema(minimum = 1, maximum = 1_000)]
+    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub limit: Option<usize>,
 }
 

@@ -57,6 +57,7 @@ pub struct MatchParams {
     #[param(value_type = Option<MatchOrderDto>, inline)]
     pub sort: Option<String>,
     /// Version of the map; the serving one unless said.
+    #[serde(default, deserialize_with = "crate::http::values::version_number")]
     pub version: Option<u64>,
 }
 

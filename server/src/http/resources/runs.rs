@@ -23,6 +23,7 @@ use crate::state::AppState;
 pub struct GeometryDto {
     /// Readings per scan, at most the server's limit.
     #[schema(example = 180, minimum = 1, maximum = 8_192)]
+    #[serde(deserialize_with = "crate::http::whole::deserialize")]
     pub num_ranges: usize,
     /// Direction of the first beam in the laser's frame.
     #[schema(example = -1.5708)]

@@ -244,7 +244,7 @@ impl From<SiteInfo> for SiteDto {
 
 /// Make a site, or find it as it stands.
 #[utoipa::path(put, path = "/v1/sites/{site}", operation_id = "make_site", tag = "sites",
-    request_body = NewSiteDto,
+    request_body = Option<NewSiteDto>,
     responses((status = 200, description = "The site as it stands", body = SiteSummaryDto),
         (status = 201, description = "The site was made", body = SiteSummaryDto,
             headers(("Location" = String, description = "The site"))),

@@ -128,6 +128,7 @@ pub struct ObservationParams {
     #[param(inline)]
     pub frame: Option<FrameDto>,
     /// Version of the map, when the frame is `map`; the serving one unless said.
+    #[serde(default, deserialize_with = "crate::http::values::version_number")]
     pub version: Option<u64>,
 }
 
@@ -175,6 +176,7 @@ pub struct TrajectoryParams {
     #[param(inline)]
     pub frame: FrameDto,
     /// Version of the map, when the frame is `map`; the serving one unless said.
+    #[serde(default, deserialize_with = "crate::http::values::version_number")]
     pub version: Option<u64>,
     /// Not before, nanoseconds.
     pub from_ns: Option<i64>,
