@@ -19,6 +19,8 @@ use crate::error::{Slug, shortened};
 pub const REQUEST_ID: HeaderName = HeaderName::from_static("x-request-id");
 /// Longest number of a request that is taken over from the client.
 const REQUEST_ID_BYTES_MAX: usize = 64;
+/// Methods that are labels of the metrics.
+const KNOWN_METHODS: [&str; 6] = ["GET", "HEAD", "PUT", "POST", "DELETE", "OPTIONS"];
 /// Longest path that is logged.
 const PATH_BYTES_MAX: usize = 200;
 
@@ -48,7 +50,8 @@ impl Seen {
     fn of(request: &Request) -> Self {
         let route = request.extensions().get::<MatchedPath>().map_or("none", |path| path.as_str());
         let path = shortened(request.uri().path().to_owned(), PATH_BYTES_MAX);
-        Self { method: request.method().to_string(), route: route.to_owned(), path }
+        let method = shortened(request.method().to_string(), PATH_BYTES_MAX);
+        Self { method, route: route.to_owned(), path }
     }
 
     fn log(&self, response: &Response, duration_s: f64) {
@@ -70,7 +73,9 @@ impl Seen {
 
     fn count(&self, response: &Response, duration_s: f64) {
         let status = response.status().as_u16().to_string();
-        let (method, route) = (self.method.clone(), self.route.clone());
+        let route = self.route.clone();
+        // A client can make up methods without end; a label cannot have as many values.
+        let method = KNOWN_METHODS.iter().find(|known| **known == self.method).copied().unwrap_or("other");
         metrics::histogram!("locution_http_request_seconds", "route" => route.clone()).record(duration_s);
         metrics::counter!("locution_http_requests_total", "method" => method, "route" => route, "status" => status)
             .increment(1);

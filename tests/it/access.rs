@@ -200,7 +200,12 @@ async fn pages_from_elsewhere_cannot_use_a_server_without_keys() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn other_machines_are_refused_without_a_key() {
-    let config = ServerConfig { address: "0.0.0.0:0".parse().unwrap(), ..Default::default() };
+    let directory = tempfile::tempdir().unwrap();
+    let config = ServerConfig {
+        address: "0.0.0.0:0".parse().unwrap(),
+        data_directory: directory.path().to_owned(),
+        ..Default::default()
+    };
     let Err(error) = start_server(config).await else { panic!("the server started") };
     assert!(error.to_string().contains("keys"), "{error}");
 }

@@ -59,7 +59,7 @@ async fn nothing_of_a_deleted_site_is_served_again() {
         let path = format!("/v1/sites/again/map{path}");
         assert_eq!(server.api.send(Method::GET, &path, &known, Vec::new()).await.unwrap().status, 200);
     }
-    let session = format!("/v1/sites/again/localisations/{}", opened["id"]);
+    let session = format!("/v1/sites/again/localisations/{}", opened["id"].as_str().unwrap());
     server.api.get(&session).await.problem(404, "not-found");
     let mut places = Vec::new();
     for site in ["again", "other"] {

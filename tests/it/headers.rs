@@ -42,22 +42,6 @@ async fn media_types_and_codings_do_not_depend_on_case() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn gzip_bodies_of_several_members_are_read_whole() {
-    let server = TestServer::start().await;
-    server.api.make_run("a", "r").await;
-    let body = json!({"first_sequence": 0, "scans": drive(20, 1)}).to_string().into_bytes();
-    let packed = body.chunks(body.len() / 3).map(gzip).collect::<Vec<_>>();
-    assert!(packed.len() >= 3);
-    let headers = [JSON, ("content-encoding", "gzip")];
-    let path = "/v1/sites/a/runs/r/batches";
-    let receipt = server.api.send(Method::POST, path, &headers, packed.concat()).await.unwrap();
-    assert_eq!(receipt.ok()["next_sequence"], 20);
-    let cut_off = packed.concat()[..packed[0].len() + packed[1].len() / 2].to_vec();
-    server.api.send(Method::POST, path, &headers, cut_off).await.unwrap().problem(400, "malformed-body");
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn what_follows_a_document_of_cbor_is_refused() {
     let server = TestServer::start().await;
     server.api.make_run("a", "r").await;

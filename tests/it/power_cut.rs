@@ -147,7 +147,7 @@ async fn check(api: &Api, scans: &[Value], told: &Told) {
     for (stored, sent) in stored.iter().zip(scans) {
         assert_eq!(stored["timestamp_ns"], sent["timestamp_ns"]);
     }
-    assert!(!*told.is_finished.lock().unwrap() || run["is_finished"] == true, "{run}");
+    assert!(!*told.is_finished.lock().unwrap() || run["state"] == "finished", "{run}");
     if told.num_maps.load(Ordering::Acquire) > 0 {
         api.get("/v1/sites/a/map").await.ok();
     }
@@ -157,7 +157,7 @@ async fn check(api: &Api, scans: &[Value], told: &Told) {
         assert_eq!(listed.contains(name), *is_made, "{name}: {listed:?}");
     }
     // What is stored can be gone on with.
-    if run["is_finished"] == false && num_stored < scans.len() {
+    if run["state"] == "open" && num_stored < scans.len() {
         let end = scans.len().min(num_stored + NUM_SCANS_PER_BATCH);
         api.post_batch("a", "r", num_stored, &scans[num_stored..end]).await.ok();
     }

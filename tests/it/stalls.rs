@@ -3,10 +3,12 @@
 use std::time::{Duration, Instant};
 
 use locution_server::config::ServerConfig;
-use locution_tests::{TestServer, drive};
+use locution_tests::{TestServer, drive, locution_binary};
 use serde_json::json;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
+
+use super::crash::Process;
 
 const HALF_A_BATCH: &[u8] = b"POST /v1/sites/s/runs/r/batches HTTP/1.1\r\nHost: localhost\r\n\
     Content-Type: application/json\r\nContent-Length: 100000\r\n\r\n{";
@@ -17,15 +19,15 @@ fn hurried(config: &mut ServerConfig) {
     config.limits.shutdown_s = 1.0;
 }
 
-async fn connect(server: &TestServer) -> TcpStream {
-    TcpStream::connect(server.api.base.trim_start_matches("http://")).await.unwrap()
+async fn connect(base: &str) -> TcpStream {
+    TcpStream::connect(base.trim_start_matches("http://")).await.unwrap()
 }
 
 /// Sends the same on many connections of their own.
-async fn open_many(server: &TestServer, num: usize, bytes: &[u8]) -> Vec<TcpStream> {
+async fn open_many(base: &str, num: usize, bytes: &[u8]) -> Vec<TcpStream> {
     let mut streams = Vec::new();
     for _ in 0..num {
-        let mut stream = connect(server).await;
+        let mut stream = connect(base).await;
         stream.write_all(bytes).await.unwrap();
         streams.push(stream);
     }
@@ -51,7 +53,7 @@ async fn bodies_that_stall_take_no_place_and_are_given_up() {
     .await;
     server.api.make_run("s", "r").await;
     let scans = drive(40, 1);
-    let stalled = open_many(&server, 32, HALF_A_BATCH).await;
+    let stalled = open_many(&server.api.base, 32, HALF_A_BATCH).await;
     for first in (0..40).step_by(10) {
         server.api.post_batch("s", "r", first, &scans[first..first + 10]).await.ok();
     }
@@ -67,10 +69,10 @@ async fn bodies_that_stall_take_no_place_and_are_given_up() {
 async fn heads_that_stall_and_idle_connections_are_closed() {
     let server = TestServer::start_with(hurried).await;
     let started = Instant::now();
-    let mut idle = connect(&server).await;
+    let mut idle = connect(&server.api.base).await;
     idle.write_all(b"GET /healthz HTTP/1.1\r\nHost: localhost\r\n\r\n").await.unwrap();
-    let mut streams = open_many(&server, 20, b"GET /healthz HTTP/1.1\r\nHost: ").await;
-    streams.extend(open_many(&server, 5, b"").await);
+    let mut streams = open_many(&server.api.base, 20, b"GET /healthz HTTP/1.1\r\nHost: ").await;
+    streams.extend(open_many(&server.api.base, 5, b"").await);
     for stream in streams {
         let answer = rest(stream).await;
         assert!(answer.is_empty() || answer.starts_with("HTTP/1.1 408"), "{answer}");
@@ -90,8 +92,8 @@ async fn health_and_metrics_answer_whatever_holds_the_places() {
     })
     .await;
     server.api.make_run("s", "r").await;
-    let _heads = open_many(&server, 50, b"GET /").await;
-    let _bodies = open_many(&server, 50, HALF_A_BATCH).await;
+    let _heads = open_many(&server.api.base, 50, b"GET /").await;
+    let _bodies = open_many(&server.api.base, 50, HALF_A_BATCH).await;
     for path in ["/healthz", "/readyz", "/metrics"] {
         let answer = server.api.get(path).await;
         assert_eq!(answer.status, 200, "{path}");
@@ -108,8 +110,8 @@ async fn the_server_ends_in_time_and_keeps_what_it_accepted() {
         server.api.post_all("s", run, &drive(900, seed), 300).await;
     }
     let job = server.api.post("/v1/sites/s/builds", &json!({})).await.ok();
-    let _half = open_many(&server, 3, HALF_A_BATCH).await;
-    let _head = open_many(&server, 3, b"GET /").await;
+    let _half = open_many(&server.api.base, 3, HALF_A_BATCH).await;
+    let _head = open_many(&server.api.base, 3, b"GET /").await;
     let started = Instant::now();
     let server =
         tokio::time::timeout(Duration::from_secs(10), server.restart()).await.expect("it does not end");
@@ -118,11 +120,36 @@ async fn the_server_ends_in_time_and_keeps_what_it_accepted() {
         assert_eq!(server.api.get(&format!("/v1/sites/s/runs/{run}")).await.ok()["num_scans"], 900);
     }
     // The interrupted build is begun anew, and being interrupted by an orderly end is no failed attempt.
-    let path = format!("/v1/sites/s/jobs/{}", job["id"]);
+    let path = format!("/v1/sites/s/jobs/{}", job["id"].as_str().unwrap());
     let deadline = Instant::now() + Duration::from_secs(120);
     while server.api.get(&path).await.ok()["state"] != "done" {
         assert!(Instant::now() < deadline);
         tokio::time::sleep(Duration::from_millis(200)).await;
     }
     server.stop().await;
+}
+
+#[cfg(unix)]
+#[tokio::test(flavor = "multi_thread")]
+async fn the_process_ends_within_ten_seconds_of_sigterm_whatever_is_under_way() {
+    let (binary, directory) = (locution_binary(), tempfile::tempdir().unwrap());
+    let server = Process::start(&binary, directory.path());
+    let base = server.api().base.clone();
+    for (run, seed) in [("r1", 1), ("r2", 2), ("r3", 3), ("r4", 4)] {
+        server.api().make_run("s", run).await;
+        server.api().post_all("s", run, &drive(1_200, seed), 300).await;
+    }
+    let job = server.api().post("/v1/sites/s/builds", &json!({})).await.ok();
+    let _bodies =
+        open_many(&base, 3, &String::from_utf8_lossy(HALF_A_BATCH).replace("/r/", "/r1/").into_bytes()).await;
+    let _heads = open_many(&base, 3, b"GET /").await;
+    let status = server.terminate(Duration::from_secs(10));
+    assert!(status.success(), "{status}");
+    let revived = Process::start(&binary, directory.path());
+    for run in ["r1", "r2", "r3", "r4"] {
+        assert_eq!(revived.api().get(&format!("/v1/sites/s/runs/{run}")).await.ok()["num_scans"], 1_200);
+    }
+    let path = format!("/v1/sites/s/jobs/{}", job["id"].as_str().unwrap());
+    let state = revived.api().get(&path).await.ok()["state"].clone();
+    assert!(["queued", "running", "done"].iter().any(|known| state == *known), "{state}");
 }

@@ -101,6 +101,15 @@ impl Share {
 
 impl Drop for Share {
     fn drop(&mut self) {
+        // Whoever waits would wake itself for ever by trying in vain.
+        if self.num == 0 {
+            return;
+        }
+        // One that holds nothing, as after a try that failed, frees nothing: telling those who wait would wake the
+        // very task that tried, again and again.
+        if self.num == 0 {
+            return;
+        }
         let mut used = self.pool.used();
         used.sum -= self.num;
         if let Some(of_key) = used.by_key.get_mut(&self.holder.key) {
@@ -136,6 +145,17 @@ mod tests {
         drop(share);
         assert_eq!(pool.num_used(), 4);
         assert_eq!(pool.num_max(&holder("alone", 1.0)), 10);
+    }
+
+    #[tokio::test]
+    async fn a_try_that_fails_wakes_nobody() {
+        let pool = Pool::new(1);
+        let key = holder("a", 1.0);
+        let _held = pool.try_take(&key, 1).unwrap();
+        let mut freed = std::pin::pin!(pool.freed.notified());
+        freed.as_mut().enable();
+        assert!(pool.try_take(&key, 1).is_none());
+        assert!(tokio::time::timeout(Duration::from_millis(20), freed).await.is_err());
     }
 
     #[tokio::test]
