@@ -57,7 +57,7 @@ async fn a_map_is_served_in_every_form_under_its_version() {
         ("grid.png", b"\x89PNG"),
         ("grid.pgm", b"P5\n"),
         ("grid.yaml", b"image: grid.pgm\n"),
-        ("graph.g2o", b"VERTEX_SE2 0 "),
+        ("graph.g2o", b"# A vertex per "),
         ("trajectory.tum", b"1."),
         ("picture.png", b"\x89PNG"),
         ("picture.svg", b"<svg "),

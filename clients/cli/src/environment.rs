@@ -6,7 +6,20 @@ use toml::Value;
 /// What every one of our variables begins with.
 const PREFIX: &str = "LOCUTION_";
 /// Variables that are no setting of the server: of the command line, and of tests.
-const OTHERS: [&str; 7] = ["URL", "API_KEY", "CONFIG", "DATASETS", "CASES", "BIN", "GOLDEN"];
+const OTHERS: [&str; 12] = [
+    "URL",
+    "API_KEY",
+    "CONFIG",
+    "DATASETS",
+    "CASES",
+    "BIN",
+    "BINARY",
+    "GOLDEN",
+    "WORLDS",
+    "CHECK_TOOLS",
+    "CHECK_EXAMPLES",
+    "CHECK_SECONDS",
+];
 
 /// Says on standard error which variables of our prefix nobody reads.
 pub fn warn_of_unknown_variables() {

@@ -5,9 +5,11 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
 
+mod bags;
 mod demo;
 mod environment;
 mod eval;
+mod health;
 mod key;
 mod optimize;
 mod replay;
@@ -30,6 +32,8 @@ struct Arguments {
 enum Command {
     /// Start the server.
     Serve(serve::ServeArguments),
+    /// Say whether a server is ready, by the exit code; for containers and scripts.
+    Health(health::HealthArguments),
     /// Read everything in a data directory and say what is damaged.
     Check(upkeep::CheckArguments),
     /// Keep what can be read of a damaged site, and say what was lost.
@@ -60,6 +64,7 @@ fn main() -> ExitCode {
     environment::warn_of_unknown_variables();
     let outcome = match command {
         Command::Serve(arguments) => serve::run(arguments),
+        Command::Health(arguments) => health::run(&arguments),
         Command::Check(arguments) => upkeep::check(&arguments),
         Command::Repair(arguments) => upkeep::repair(&arguments),
         Command::Compact(arguments) => upkeep::compact(&arguments),

@@ -1,6 +1,6 @@
-//! `locution replay`: posts CARMEN logs to a running server, as their robots would have.
+//! `locution replay`: posts recordings to a running server, as their robots would have.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Result, ensure};
 use clap::{Args, ValueEnum};
@@ -8,6 +8,7 @@ use futures::future::try_join_all;
 use locution_client::{Client, Encoding, MapAt, RunUpload};
 use locution_engine::formats::CarmenOptions;
 
+use super::bags::{BagOptions, BagRecording, is_bag, read_bag};
 use super::upload::{
     UploadOptions, Uploaded, build_with_progress, open_run, progress_bar, reach_server, upload_recording,
 };
@@ -34,7 +35,8 @@ impl From<Format> for Encoding {
 /// Every file becomes a run; what the server already has of it is not sent again.
 #[derive(Debug, Args)]
 pub struct ReplayArguments {
-    /// CARMEN logs (FLASER or ROBOTLASER1), plain or gzipped; runs are made in this order and sent at once.
+    /// CARMEN logs (FLASER or ROBOTLASER1), plain or gzipped; MCAP files, or folders of them, of ROS 1 or ROS 2; bags of
+    /// ROS 1. Runs are made in this order and sent at once.
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The server.
@@ -68,6 +70,12 @@ pub struct ReplayArguments {
     /// Angle that the readings of FLASER messages cover, degrees [default: as the log states].
     #[arg(long, value_name = "DEGREES")]
     fov: Option<f64>,
+    /// Topic of the laser in a bag [default: the only one, or the usual one].
+    #[arg(long, value_name = "TOPIC")]
+    scan_topic: Option<String>,
+    /// Topic of the odometry in a bag [default: the only one, or the usual one, or tf].
+    #[arg(long, value_name = "TOPIC")]
+    odom_topic: Option<String>,
     /// Pass over lines that cannot be read, and over what follows where a packed file is cut off.
     #[arg(long)]
     skip_malformed: bool,
@@ -97,10 +105,7 @@ pub fn run(arguments: &ReplayArguments) -> Result<()> {
     };
     let mut recordings: Vec<Recording> = Vec::new();
     for file in &arguments.files {
-        let mut recording = read_recording(file, options)?;
-        for skipped in &recording.log.skipped {
-            eprintln!("{}: {skipped}", file.display());
-        }
+        let mut recording = arguments.read(file, options)?;
         if let Some(run) = &arguments.run {
             recording.name.clone_from(run);
         }
@@ -151,6 +156,30 @@ async fn replay(arguments: &ReplayArguments, recordings: &[Recording]) -> Result
         build_with_progress(&client, site).await?;
     }
     print_where_to_look(&client, site, arguments.wait).await
+}
+
+impl ReplayArguments {
+    /// Reads a recording of any format, and says on standard error what there is to say of it.
+    fn read(&self, file: &Path, options: CarmenOptions) -> Result<Recording> {
+        if !is_bag(file)? {
+            let recording = read_recording(file, options)?;
+            for skipped in &recording.log.skipped {
+                eprintln!("{}: {skipped}", file.display());
+            }
+            return Ok(recording);
+        }
+        let options = BagOptions {
+            scan_topic: self.scan_topic.clone(),
+            odometry_topic: self.odom_topic.clone(),
+            range_max_m: self.range_max,
+            skip_malformed: self.skip_malformed,
+        };
+        let BagRecording { recording, notes } = read_bag(file, &options)?;
+        for note in notes {
+            eprintln!("{}: {note}", file.display());
+        }
+        Ok(recording)
+    }
 }
 
 fn summary(run: &str, uploaded: &Uploaded) -> String {

@@ -79,9 +79,11 @@ pub fn read_text(path: &Path) -> Result<String> {
         .unwrap_or_else(|error| String::from_utf8_lossy(error.as_bytes()).into_owned()))
 }
 
-fn run_name(path: &Path) -> String {
+/// The name that the run of a recording gets: that of the file without its endings, in the characters that names of runs
+/// may have.
+pub fn run_name(path: &Path) -> String {
     let file_name = path.file_name().unwrap_or_default().to_string_lossy();
-    let stem = [".gz", ".log", ".clf", ".carmen", ".txt"]
+    let stem = [".gz", ".log", ".clf", ".carmen", ".txt", ".mcap", ".bag"]
         .iter()
         .fold(file_name.as_ref(), |name, ending| name.strip_suffix(ending).unwrap_or(name));
     let allowed = |c: char| if c.is_ascii_alphanumeric() || "._-".contains(c) { c } else { '-' };

@@ -8,9 +8,18 @@ from types import TracebackType
 
 import httpx
 
-from . import routes
+from . import models, routes
 from .localization import example_body
-from .models import ExampleAnswer, SiteSummary, WordAnswer, WordPattern, WordQuery
+from .models import (
+    ExampleAnswer,
+    LabelAnswer,
+    LabelPattern,
+    LabelQuery,
+    SiteSummary,
+    WordAnswer,
+    WordPattern,
+    WordQuery,
+)
 from .readers import RosOptions
 from .recording import Recording
 from .site import Site
@@ -86,6 +95,28 @@ class Client:
         body = example_body(recording, options)
         answers = self._transport.send(routes.QUERY_EXAMPLE_EVERYWHERE, cbor=body).json()
         return [ExampleAnswer.from_dict(answer) for answer in answers]
+
+    def keys(self) -> models.Keys:
+        """The keys that the server knows."""
+        return self._transport.get(models.Keys, routes.LIST_KEYS)
+
+    def make_key(self, key: models.NewKey) -> models.IssuedKey:
+        """Makes a key; it is shown this once."""
+        return self._transport.get(models.IssuedKey, routes.MAKE_KEY, json=key.to_dict())
+
+    def rotate_key(self, key: str, grace_s: int | None = None) -> models.IssuedKey:
+        """Replaces a key; the old one stays valid for a while."""
+        return self._transport.get(models.IssuedKey, routes.ROTATE_KEY, key, query={"grace_s": grace_s})
+
+    def revoke_key(self, key: str) -> None:
+        """Ends a key at once."""
+        self._transport.send(routes.REVOKE_KEY, key)
+
+    def query_labels(self, labels: Sequence[LabelPattern], limit: int | None = None) -> list[LabelAnswer]:
+        """Where, in all sites, these kinds of places are driven one after the other."""
+        body = LabelQuery(labels=list(labels), limit=limit).to_dict()
+        answers = self._transport.send(routes.QUERY_LABELS_EVERYWHERE, json=body).json()
+        return [LabelAnswer.from_dict(answer) for answer in answers]
 
     def query_words(self, words: Sequence[WordPattern], limit: int | None = None) -> list[WordAnswer]:
         """Where, in all sites, these words are driven one after the other; best fit first."""

@@ -52,6 +52,10 @@ class Site:
             raise
         return True
 
+    def change(self, change: models.SiteChange) -> models.ChangedSite:
+        """Changes what of the site's configuration can be changed."""
+        return self._transport.get(models.ChangedSite, routes.CHANGE_SITE, self.name, json=change.to_dict())
+
     def delete(self) -> None:
         """Deletes the site and all that it holds."""
         self._transport.send(routes.DELETE_SITE, self.name)
@@ -133,6 +137,11 @@ class Site:
             raise RecordingError(f"{run}: no scan has odometry near its time")
         return self.finish(run) if finish else self.run(run)
 
+    def delete_run(self, run: str) -> models.Job | None:
+        """Deletes a run; where the map must follow, the job that sees to it."""
+        answer = self._transport.send(routes.DELETE_RUN, self.name, run)
+        return models.Job.from_dict(answer.json()) if answer.status_code == 202 else None
+
     def scans(self, run: str, limit: int | None = None) -> Iterator[models.StoredScan]:
         """Scans as they are stored; `limit` is that of a page."""
         query = {"limit": limit}
@@ -186,6 +195,10 @@ class Site:
     def job(self, job: str) -> models.Job:
         """A job as it stands."""
         return self._transport.get(models.Job, routes.GET_JOB, self.name, job)
+
+    def cancel(self, job: str) -> models.Job:
+        """Cancels a job."""
+        return self._transport.get(models.Job, routes.CANCEL_JOB, self.name, job)
 
     def jobs(self) -> Iterator[models.Job]:
         """All jobs that are remembered, the newest first."""
@@ -259,6 +272,10 @@ class Site:
     def localization(self, geometry: models.Geometry, robot: str | None = None) -> LocalizationSession:
         """Opens a session for a robot that asks where it is while it drives."""
         return LocalizationSession(self._transport, self.name, geometry, robot)
+
+    def localizations(self) -> Iterator[models.Localization]:
+        """The sessions that are open."""
+        return self._transport.all(models.Localization, routes.LIST_LOCALIZATIONS, self.name)
 
     def localize(
         self,

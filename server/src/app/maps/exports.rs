@@ -1,5 +1,7 @@
 //! Map versions in the formats of other tools.
 
+use std::collections::BTreeSet;
+
 use locution_engine::formats::{GraphDocument, GrayImage, write_g2o};
 use locution_engine::geometry::Point2;
 use locution_engine::occupancy::{CellState, GridMap};
@@ -15,8 +17,16 @@ use crate::records::{Map, PlacedRun};
 /// Components drawn in one picture, the largest first.
 const NUM_PANELS_MAX: usize = 12;
 
-/// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per verified match, and one
-/// `FIX` per component.
+/// Head of every graph that is served.
+const GRAPH_HEAD: &str = "\
+# A vertex per keyframe, an edge per motion, and one per registration of verified matches; one FIX per component.
+# The vertices are where the map has them, which is not quite the optimum of these edges: the map weighs registrations
+# between submaps against each other, of which a match names the one that speaks for it, and shares out among the
+# keyframes in between. Optimising this file therefore moves vertices by some centimetres.
+";
+
+/// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified matches, and
+/// one `FIX` per component. Comments say which run and scan each vertex is.
 ///
 /// # Errors
 /// Those of the storage; [`AppError::Internal`] for a graph that cannot be.
@@ -24,27 +34,35 @@ pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, A
     let runs = map.placed_runs(component).await?;
     let mut graph = PoseGraph::new();
     let mut first_of_run = vec![None; map.record.runs.len()];
-    let mut fixed = std::collections::BTreeSet::new();
+    let mut fixed = BTreeSet::new();
+    let mut text = GRAPH_HEAD.to_owned();
     for placed in &runs {
         let first = graph.poses().len() as u32;
         first_of_run[placed.map_run.run as usize] = Some(first);
-        for pose in &placed.poses {
+        for (vertex, pose) in (first..).zip(&placed.poses) {
             graph.add_pose(pose.map_from_robot).map_err(AppError::internal)?;
+            text += &format!("# {vertex} run {} scan {}\n", placed.map_run.name, pose.scan_seq);
         }
         if fixed.insert(placed.map_run.component) {
             graph.hold(first).map_err(AppError::internal)?;
         }
         add_motions(&mut graph, first, placed).await?;
     }
+    // One registration may speak for several matches; it is one measurement all the same.
+    let mut measured = BTreeSet::new();
     for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let found = numbered.found;
         let firsts = [found.earlier.run_idx, found.later.run_idx].map(|run| first_of_run[run as usize]);
         if let ([Some(earlier), Some(later)], Some(fit)) = (firsts, found.evidence.registration) {
             let ends = (earlier + fit.earlier_keyframe, later + fit.later_keyframe);
+            if !measured.insert(ends) {
+                continue;
+            }
             add_edge(&mut graph, ends, fit.earlier_from_later, &fit.covariance);
         }
     }
-    Ok(write_g2o(&GraphDocument::numbered(graph)))
+    text += &write_g2o(&GraphDocument::numbered(graph));
+    Ok(text)
 }
 
 async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> Result<(), AppError> {
@@ -81,9 +99,19 @@ fn add_edge(
     i_from_j: locution_engine::geometry::Pose2,
     covariance: &[[f64; 3]; 3],
 ) {
-    if let Ok(information) = InformationMatrix::from_covariance(covariance) {
+    let covariance = in_axes_of_measurement(covariance, i_from_j.theta);
+    if let Ok(information) = InformationMatrix::from_covariance(&covariance) {
         let _ = graph.add_constraint(PoseConstraint { i, j, i_from_j, information });
     }
+}
+
+/// Covariances are kept in the axes of the first pose; a graph's edge has them in those of the second, which is turned by
+/// `theta` against it.
+fn in_axes_of_measurement(covariance: &[[f64; 3]; 3], theta: f64) -> [[f64; 3]; 3] {
+    let (sin, cos) = theta.sin_cos();
+    let turned = |[x, y, turn]: [f64; 3]| [cos * x + sin * y, cos * y - sin * x, turn];
+    let transposed = |m: [[f64; 3]; 3]| [0, 1, 2].map(|column| m.map(|row| row[column]));
+    transposed(transposed(covariance.map(turned)).map(turned))
 }
 
 /// The grey values of `map_server`: 254 free, 0 occupied, 205 unknown, the first row on top.
@@ -161,4 +189,20 @@ async fn lines_of(map: &Map, component: u32) -> Result<Vec<Line>, AppError> {
         lines.push(Line { run: Some(placed.map_run.run as usize), points });
     }
     Ok(lines)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_sure_along_the_first_pose_is_sure_across_one_that_is_turned_by_a_quarter() {
+        let covariance = [[4.0, 1.0, 0.5], [1.0, 9.0, 0.25], [0.5, 0.25, 1.0]];
+        let turned = in_axes_of_measurement(&covariance, std::f64::consts::FRAC_PI_2);
+        let expected = [[9.0, -1.0, 0.25], [-1.0, 4.0, -0.5], [0.25, -0.5, 1.0]];
+        for (row, wanted) in turned.iter().flatten().zip(expected.iter().flatten()) {
+            assert!((row - wanted).abs() < 1e-12, "{turned:?}");
+        }
+        assert_eq!(in_axes_of_measurement(&covariance, 0.0), covariance);
+    }
 }

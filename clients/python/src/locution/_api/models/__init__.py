@@ -4,6 +4,7 @@ from .batch import Batch
 from .change import Change
 from .change_kind import ChangeKind
 from .change_page import ChangePage
+from .changed_site import ChangedSite
 from .channel import Channel
 from .component import Component
 from .connection import Connection
@@ -11,6 +12,20 @@ from .connection_kind import ConnectionKind
 from .decision_body import Decision
 from .decision_kind import DecisionKind
 from .direction import Direction
+from .event_type_0 import EventType0
+from .event_type_0_event import EventType0Event
+from .event_type_1 import EventType1
+from .event_type_1_event import EventType1Event
+from .event_type_2 import EventType2
+from .event_type_2_event import EventType2Event
+from .event_type_3 import EventType3
+from .event_type_3_event import EventType3Event
+from .event_type_4 import EventType4
+from .event_type_4_event import EventType4Event
+from .event_type_5 import EventType5
+from .event_type_5_event import EventType5Event
+from .event_type_6 import EventType6
+from .event_type_6_event import EventType6Event
 from .evidence import Evidence
 from .example_answer import ExampleAnswer
 from .example_evidence import ExampleEvidence
@@ -23,20 +38,29 @@ from .grid import Grid
 from .grid_info import GridInfo
 from .hypothesis import Hypothesis
 from .interval import Interval
+from .issued_key import IssuedKey
 from .job import Job
 from .job_kind import JobKind
 from .job_page import JobPage
 from .job_state import JobState
+from .key import Key
 from .keyframe_pose import KeyframePose
+from .keys import Keys
 from .label_answer import LabelAnswer
 from .label_page import LabelPage
 from .label_pattern import LabelPattern
 from .label_query import LabelQuery
 from .labeled_stretch import Label
+from .list_labels_label import ListLabelsLabel
 from .list_matches_channel import ListMatchesChannel
+from .list_matches_decision import ListMatchesDecision
 from .list_matches_direction import ListMatchesDirection
+from .list_matches_sort import ListMatchesSort
 from .list_matches_state import ListMatchesState
+from .list_observations_frame import ListObservationsFrame
+from .list_scans_frame import ListScansFrame
 from .localization import Localization
+from .localization_page import LocalizationPage
 from .localization_state import LocalizationState
 from .map_ import Map
 from .map_run import MapRun
@@ -44,6 +68,8 @@ from .map_statistics import MapStatistics
 from .match import Match
 from .match_page import MatchPage
 from .match_state import MatchState
+from .missing import Missing
+from .new_key import NewKey
 from .new_localization import NewLocalization
 from .new_run import NewRun
 from .new_site import NewSite
@@ -55,19 +81,24 @@ from .place_label import PlaceLabel
 from .place_page import PlacePage
 from .point import Point
 from .pose import Pose
+from .pose_prior import PosePrior
 from .problem import Problem
 from .receipt import Receipt
 from .region import Region
 from .registration import Registration
 from .rejection_reason import RejectionReason
+from .retention import Retention
 from .route import Route
 from .route_step import RouteStep
 from .route_turn import RouteTurn
 from .run import Run
+from .run_change import RunChange
 from .run_page import RunPage
 from .run_state import RunState
 from .scan import Scan
 from .site import Site
+from .site_change import SiteChange
+from .site_change_config_type_0 import SiteChangeConfigType0
 from .site_config import SiteConfig
 from .site_state import SiteState
 from .site_summary import SiteSummary
@@ -87,6 +118,7 @@ from .word_query import WordQuery
 __all__ = (
     "Batch",
     "Change",
+    "ChangedSite",
     "ChangeKind",
     "ChangePage",
     "Channel",
@@ -96,6 +128,20 @@ __all__ = (
     "Decision",
     "DecisionKind",
     "Direction",
+    "EventType0",
+    "EventType0Event",
+    "EventType1",
+    "EventType1Event",
+    "EventType2",
+    "EventType2Event",
+    "EventType3",
+    "EventType3Event",
+    "EventType4",
+    "EventType4Event",
+    "EventType5",
+    "EventType5Event",
+    "EventType6",
+    "EventType6Event",
     "Evidence",
     "ExampleAnswer",
     "ExampleEvidence",
@@ -108,20 +154,29 @@ __all__ = (
     "GridInfo",
     "Hypothesis",
     "Interval",
+    "IssuedKey",
     "Job",
     "JobKind",
     "JobPage",
     "JobState",
+    "Key",
     "KeyframePose",
+    "Keys",
     "Label",
     "LabelAnswer",
     "LabelPage",
     "LabelPattern",
     "LabelQuery",
+    "ListLabelsLabel",
     "ListMatchesChannel",
+    "ListMatchesDecision",
     "ListMatchesDirection",
+    "ListMatchesSort",
     "ListMatchesState",
+    "ListObservationsFrame",
+    "ListScansFrame",
     "Localization",
+    "LocalizationPage",
     "LocalizationState",
     "Map",
     "MapRun",
@@ -129,6 +184,8 @@ __all__ = (
     "Match",
     "MatchPage",
     "MatchState",
+    "Missing",
+    "NewKey",
     "NewLocalization",
     "NewRun",
     "NewSite",
@@ -140,19 +197,24 @@ __all__ = (
     "PlacePage",
     "Point",
     "Pose",
+    "PosePrior",
     "Problem",
     "Receipt",
     "Region",
     "Registration",
     "RejectionReason",
+    "Retention",
     "Route",
     "RouteStep",
     "RouteTurn",
     "Run",
+    "RunChange",
     "RunPage",
     "RunState",
     "Scan",
     "Site",
+    "SiteChange",
+    "SiteChangeConfigType0",
     "SiteConfig",
     "SiteState",
     "SiteSummary",

@@ -25,6 +25,7 @@ class ExampleAnswer:
         state (LocalizationState): How sure an answer is.
         travel_m (float): Metres that the example drives.
         places (list[ExamplePlace]): Places where the robot was at the end of the example, likeliest first.
+        probability_elsewhere (float): Probability that the example was not made in this site.
     """
 
     site: str
@@ -32,6 +33,7 @@ class ExampleAnswer:
     state: LocalizationState
     travel_m: float
     places: list[ExamplePlace]
+    probability_elsewhere: float
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -48,6 +50,8 @@ class ExampleAnswer:
             places_item = places_item_data.to_dict()
             places.append(places_item)
 
+        probability_elsewhere = self.probability_elsewhere
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -57,6 +61,7 @@ class ExampleAnswer:
                 "state": state,
                 "travel_m": travel_m,
                 "places": places,
+                "probability_elsewhere": probability_elsewhere,
             }
         )
 
@@ -82,12 +87,15 @@ class ExampleAnswer:
 
             places.append(places_item)
 
+        probability_elsewhere = d.pop("probability_elsewhere")
+
         example_answer = cls(
             site=site,
             map_version=map_version,
             state=state,
             travel_m=travel_m,
             places=places,
+            probability_elsewhere=probability_elsewhere,
         )
 
         example_answer.additional_properties = d

@@ -23,6 +23,8 @@ class Job:
         state (JobState): How far a job is.
         progress (float): From 0 to 1.
         detail (str): What it is at, or what came of it.
+        left_s (float | None | Unset): Seconds that it will still take at work, by the time that it has taken so far;
+            null while that cannot be told.
         error (None | str | Unset): Why it failed.
     """
 
@@ -31,6 +33,7 @@ class Job:
     state: JobState
     progress: float
     detail: str
+    left_s: float | None | Unset = UNSET
     error: None | str | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
@@ -44,6 +47,12 @@ class Job:
         progress = self.progress
 
         detail = self.detail
+
+        left_s: float | None | Unset
+        if isinstance(self.left_s, Unset):
+            left_s = UNSET
+        else:
+            left_s = self.left_s
 
         error: None | str | Unset
         if isinstance(self.error, Unset):
@@ -62,6 +71,8 @@ class Job:
                 "detail": detail,
             }
         )
+        if left_s is not UNSET:
+            field_dict["left_s"] = left_s
         if error is not UNSET:
             field_dict["error"] = error
 
@@ -80,6 +91,15 @@ class Job:
 
         detail = d.pop("detail")
 
+        def _parse_left_s(data: object) -> float | None | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(float | None | Unset, data)
+
+        left_s = _parse_left_s(d.pop("left_s", UNSET))
+
         def _parse_error(data: object) -> None | str | Unset:
             if data is None:
                 return data
@@ -95,6 +115,7 @@ class Job:
             state=state,
             progress=progress,
             detail=detail,
+            left_s=left_s,
             error=error,
         )
 

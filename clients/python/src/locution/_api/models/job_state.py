@@ -2,6 +2,7 @@ from enum import Enum
 
 
 class JobState(str, Enum):
+    CANCELLED = "cancelled"
     DONE = "done"
     FAILED = "failed"
     QUEUED = "queued"

@@ -18,17 +18,21 @@ class LabelAnswer:
     """Where a question fits.
 
     Attributes:
+        site (str): The site.
         places (list[Label]): The stretches, in the order of the question.
         is_reversed (bool): Whether the run drove them the other way round.
         confidence (float): The least sure of its labels.
     """
 
+    site: str
     places: list[Label]
     is_reversed: bool
     confidence: float
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
+        site = self.site
+
         places = []
         for places_item_data in self.places:
             places_item = places_item_data.to_dict()
@@ -42,6 +46,7 @@ class LabelAnswer:
         field_dict.update(self.additional_properties)
         field_dict.update(
             {
+                "site": site,
                 "places": places,
                 "is_reversed": is_reversed,
                 "confidence": confidence,
@@ -55,6 +60,8 @@ class LabelAnswer:
         from ..models.labeled_stretch import Label  # noqa: PLC0415
 
         d = dict(src_dict)
+        site = d.pop("site")
+
         places = []
         _places = d.pop("places")
         for places_item_data in _places:
@@ -67,6 +74,7 @@ class LabelAnswer:
         confidence = d.pop("confidence")
 
         label_answer = cls(
+            site=site,
             places=places,
             is_reversed=is_reversed,
             confidence=confidence,

@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 from ..models.localization_state import LocalizationState
+from ..models.missing import Missing
+from ..types import UNSET, Unset
 
 if TYPE_CHECKING:
     from ..models.hypothesis import Hypothesis
@@ -26,6 +28,11 @@ class Localization:
         next_sequence (int): The sequence number to send next.
         travel_m (float): Metres driven since it began.
         hypotheses (list[Hypothesis]): Likeliest first.
+        expires_in_s (float): Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+        probability_elsewhere (float): Probability that the robot is not in this map; with those of all places 1.
+        missing (list[Missing]): What is missing to be `converged`; empty when it is.
+        prior_agrees (bool | None | Unset): Whether the likeliest place is the one that was declared; absent without a
+            declaration or a likely place.
     """
 
     id: str
@@ -34,6 +41,10 @@ class Localization:
     next_sequence: int
     travel_m: float
     hypotheses: list[Hypothesis]
+    expires_in_s: float
+    probability_elsewhere: float
+    missing: list[Missing]
+    prior_agrees: bool | None | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -52,6 +63,21 @@ class Localization:
             hypotheses_item = hypotheses_item_data.to_dict()
             hypotheses.append(hypotheses_item)
 
+        expires_in_s = self.expires_in_s
+
+        probability_elsewhere = self.probability_elsewhere
+
+        missing = []
+        for missing_item_data in self.missing:
+            missing_item = missing_item_data.value
+            missing.append(missing_item)
+
+        prior_agrees: bool | None | Unset
+        if isinstance(self.prior_agrees, Unset):
+            prior_agrees = UNSET
+        else:
+            prior_agrees = self.prior_agrees
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -62,8 +88,13 @@ class Localization:
                 "next_sequence": next_sequence,
                 "travel_m": travel_m,
                 "hypotheses": hypotheses,
+                "expires_in_s": expires_in_s,
+                "probability_elsewhere": probability_elsewhere,
+                "missing": missing,
             }
         )
+        if prior_agrees is not UNSET:
+            field_dict["prior_agrees"] = prior_agrees
 
         return field_dict
 
@@ -89,6 +120,26 @@ class Localization:
 
             hypotheses.append(hypotheses_item)
 
+        expires_in_s = d.pop("expires_in_s")
+
+        probability_elsewhere = d.pop("probability_elsewhere")
+
+        missing = []
+        _missing = d.pop("missing")
+        for missing_item_data in _missing:
+            missing_item = Missing(missing_item_data)
+
+            missing.append(missing_item)
+
+        def _parse_prior_agrees(data: object) -> bool | None | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(bool | None | Unset, data)
+
+        prior_agrees = _parse_prior_agrees(d.pop("prior_agrees", UNSET))
+
         localization = cls(
             id=id,
             map_version=map_version,
@@ -96,6 +147,10 @@ class Localization:
             next_sequence=next_sequence,
             travel_m=travel_m,
             hypotheses=hypotheses,
+            expires_in_s=expires_in_s,
+            probability_elsewhere=probability_elsewhere,
+            missing=missing,
+            prior_agrees=prior_agrees,
         )
 
         localization.additional_properties = d

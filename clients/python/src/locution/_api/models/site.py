@@ -9,6 +9,7 @@ from attrs import field as _attrs_field
 from ..types import UNSET, Unset
 
 if TYPE_CHECKING:
+    from ..models.retention import Retention
     from ..models.site_config import SiteConfig
 
 
@@ -22,6 +23,7 @@ class Site:
     Attributes:
         site (str): Its name. Example: hospital-floor-2.
         config (SiteConfig): The engine's configuration in it, complete.
+        retention (Retention): How much of a site is kept; what is left out is kept whole.
         num_runs (int): Runs.
         num_scans (int): Scans of all runs.
         num_observations (int): Observations of all runs.
@@ -33,6 +35,7 @@ class Site:
 
     site: str
     config: SiteConfig
+    retention: Retention
     num_runs: int
     num_scans: int
     num_observations: int
@@ -46,6 +49,8 @@ class Site:
         site = self.site
 
         config = self.config.to_dict()
+
+        retention = self.retention.to_dict()
 
         num_runs = self.num_runs
 
@@ -71,6 +76,7 @@ class Site:
             {
                 "site": site,
                 "config": config,
+                "retention": retention,
                 "num_runs": num_runs,
                 "num_scans": num_scans,
                 "num_observations": num_observations,
@@ -86,12 +92,15 @@ class Site:
 
     @classmethod
     def from_dict(cls: type[T], src_dict: Mapping[str, Any]) -> T:
+        from ..models.retention import Retention  # noqa: PLC0415
         from ..models.site_config import SiteConfig  # noqa: PLC0415
 
         d = dict(src_dict)
         site = d.pop("site")
 
         config = SiteConfig.from_dict(d.pop("config"))
+
+        retention = Retention.from_dict(d.pop("retention"))
 
         num_runs = d.pop("num_runs")
 
@@ -117,6 +126,7 @@ class Site:
         site = cls(
             site=site,
             config=config,
+            retention=retention,
             num_runs=num_runs,
             num_scans=num_scans,
             num_observations=num_observations,

@@ -20,12 +20,15 @@ class Trajectory:
     """Poses of one run.
 
     Attributes:
-        poses (list[StampedPose]): One for every scan, in order.
+        poses (list[StampedPose]): One for every scan that was asked for, in order.
         component (int | None | Unset): Component of the map that the poses belong to; null outside the map frame.
+        next_cursor (None | str | Unset): Where the next ones begin, when fewer were wanted than there are; null at the
+            end.
     """
 
     poses: list[StampedPose]
     component: int | None | Unset = UNSET
+    next_cursor: None | str | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -40,6 +43,12 @@ class Trajectory:
         else:
             component = self.component
 
+        next_cursor: None | str | Unset
+        if isinstance(self.next_cursor, Unset):
+            next_cursor = UNSET
+        else:
+            next_cursor = self.next_cursor
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -49,6 +58,8 @@ class Trajectory:
         )
         if component is not UNSET:
             field_dict["component"] = component
+        if next_cursor is not UNSET:
+            field_dict["next_cursor"] = next_cursor
 
         return field_dict
 
@@ -73,9 +84,19 @@ class Trajectory:
 
         component = _parse_component(d.pop("component", UNSET))
 
+        def _parse_next_cursor(data: object) -> None | str | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(None | str | Unset, data)
+
+        next_cursor = _parse_next_cursor(d.pop("next_cursor", UNSET))
+
         trajectory = cls(
             poses=poses,
             component=component,
+            next_cursor=next_cursor,
         )
 
         trajectory.additional_properties = d
