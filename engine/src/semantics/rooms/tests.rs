@@ -101,12 +101,12 @@ prop_compose! {
 
 proptest! {
     #[test]
-    fn thickness_is_the_largest_disc_but_for_a_cell(grid in floors()) {
+    fn thickness_is_the_largest_disc_but_for_a_few_cells(grid in floors()) {
         let floor = Floor::of_grid(&grid, 0.0);
         let clearance = distance_to_blocked(floor.width, floor.height, &floor.is_free);
         let fast = thickness::thickness(&floor, &clearance);
         for (fast, slow) in fast.iter().zip(thickness_by_definition(&floor, &clearance)) {
-            prop_assert!(*fast <= slow && *fast >= slow - 1.5, "{} for {}", fast, slow);
+            prop_assert!(*fast <= slow && *fast >= slow - 3.0, "{} for {}", fast, slow);
         }
     }
 
