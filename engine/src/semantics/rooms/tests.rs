@@ -1,3 +1,5 @@
+//! Drawn floors, and laws of random ones.
+
 use super::*;
 use crate::occupancy::CellState;
 use proptest::prelude::*;
