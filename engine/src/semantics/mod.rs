@@ -9,7 +9,7 @@
 //!                                    routes, stretches of one label ◄─ places of the map ◄─┘
 //! ```
 //! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it, and [`MapLabels`] does both
-//! for every component of a map.
+//! for every component of a map. [`find_rooms`] needs no run: it divides a served grid into rooms and doors.
 
 mod block;
 mod config;
@@ -20,6 +20,7 @@ mod label_map;
 mod map_labels;
 mod outline;
 mod places;
+mod rooms;
 mod route;
 mod rules;
 mod segmentation;
@@ -34,6 +35,7 @@ pub use label::PlaceLabel;
 pub use label_map::{DrivenRun, LabeledRun, label_runs};
 pub use map_labels::MapLabels;
 pub use places::{Place, PlaceMap, Spot, Visit};
+pub use rooms::{Door, Room, RoomKind, RoomMap, RoomsConfig, find_rooms};
 pub use route::{Route, RouteStep, Turn, route};
 pub use rules::label_of;
 pub use segmentation::{Segment, SegmentationConfig, segments};

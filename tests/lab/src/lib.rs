@@ -5,6 +5,7 @@
 //! - [`density_field`], [`particle_filter`]: Monte-Carlo localisation as the thesis has it (chapter 3)
 //! - [`thesis`]: its scenarios and tables
 //! - [`open_world`]: robots on maps of their own building, of a part of it, and of others, without a server
+//! - [`room_trials`]: rooms and doors of plans, judged
 //! - [`recordings`], [`worlds`], [`report`], [`plot`]: files in, tables and pictures out
 //!
 //! `examples/` holds programs that map recordings and worlds without a server, and a load generator.
@@ -17,6 +18,7 @@ pub mod particle_filter;
 pub mod plot;
 pub mod recordings;
 pub mod report;
+pub mod room_trials;
 pub mod simulation;
 pub mod small_building;
 mod stroke_font;

@@ -32,6 +32,8 @@ enum What {
     Query(query::QueryArguments),
     /// Robots on maps of their own building, of a part of it, and of others, without a server: ever wrongly sure, found.
     OpenWorld(locution_lab::open_world::OpenWorldArguments),
+    /// Rooms and doors of floor plans, and of what a robot saw of them, against drawn ones.
+    Rooms(locution_lab::room_trials::RoomsArguments),
     /// Pose graphs with forged closures: how often the optimizer is not misled.
     Robust(robust::RobustArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
@@ -52,6 +54,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
             What::OpenWorld(arguments) => locution_lab::open_world::run(arguments),
+            What::Rooms(arguments) => locution_lab::room_trials::run(arguments),
             What::Robust(arguments) => robust::run(arguments),
             What::Thesis(arguments) => locution_lab::thesis::run(arguments),
         }

@@ -14,6 +14,7 @@ mod map_error;
 mod open_world;
 mod recognition;
 mod revisits;
+mod rooms;
 mod spoiled_graphs;
 mod summary;
 mod trajectory_error;
@@ -31,6 +32,7 @@ pub use recognition::{
     judge_recognition,
 };
 pub use revisits::{JudgedRun, Revisits, Visit, find_revisits};
+pub use rooms::{DoorScore, RoomScore, judge_doors, judge_rooms};
 pub use spoiled_graphs::{Generator, OutlierDraw, rms_error_m, spoil};
 pub use summary::MeanSd;
 pub use trajectory_error::{TrajectoryError, judge_trajectory};
