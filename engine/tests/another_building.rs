@@ -2,6 +2,8 @@
 //!
 //! Skipped where the case is absent; `LOCUTION_CASES` says where cases are.
 
+#![allow(clippy::unwrap_used)]
+
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
