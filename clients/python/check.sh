@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Proves the Python package against a real server: generated bodies current, types, style, tests with bags and notebook,
-# wheel built and used. Takes about two minutes.
+# package for ROS 2 tested, wheel built and used. Takes about three minutes.
 # usage: bash clients/python/check.sh [PROGRAM]      the built `locution`; target/release/locution unless said
 set -euo pipefail
 cd "$(dirname "$0")"
@@ -26,6 +26,8 @@ mypy
 mypy --strict examples/make_bag.py
 step "tests"
 timeout 300 python -m pytest -q
+step "the package for ROS 2, without ROS"
+(cd ../ros2/locution_ros && ruff check . && ruff format --check --quiet . && mypy && timeout 200 python -m pytest -q)
 step "wheel"
 python -m build --wheel --outdir "$work/dist" . >"$work/build.log" 2>&1 || { cat "$work/build.log" >&2; exit 1; }
 python -m venv "$work/clean"
