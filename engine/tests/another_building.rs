@@ -3,8 +3,6 @@
 //! Skipped where the case is absent; `LOCUTION_CASES` says where cases are.
 #![allow(clippy::unwrap_used)]
 
-#![allow(clippy::unwrap_used)]
-
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
