@@ -5,8 +5,6 @@
 //! likelihood field and split, the most promising first. So poses come out in the order of their score, and every pose
 //! that is not reported scores less than the last one that is.
 
-use std::cmp::Ordering;
-use std::collections::BinaryHeap;
 use std::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
@@ -80,12 +78,21 @@ impl GlobalSearchConfig {
 /// Levels above the finest; the largest squares have 2^5 cells a side.
 const NUM_LEVELS: usize = 6;
 
+/// Points farther than this from the robot are not searched with, metres: the map has so wide a margin of nothing.
+pub const SEARCH_REACH_MAX_M: f64 = 20.0;
+
 /// Maxima of a likelihood field over squares that start at every cell, for squares of 1, 2, 4 … cells a side.
+///
+/// A margin around the map spares every look the question whether it falls outside.
 #[derive(Clone, Debug)]
 pub struct SearchPyramid {
+    /// Columns and rows with the margin.
     width: usize,
     height: usize,
+    /// Cells of the margin on every side.
+    margin: usize,
     cell_m: f64,
+    /// Lower left corner of the margin.
     origin: Point2,
     /// Best likelihood code in the square.
     codes: Vec<Vec<u8>>,
@@ -97,22 +104,27 @@ impl SearchPyramid {
     /// The pyramid of a map, on cells of about 0.2 m. Cost: linear in cells times levels.
     pub fn build(grid: &GridMap, likelihood: &LikelihoodField) -> Self {
         let merge = ((0.2 / grid.resolution_m()).round() as usize).max(1);
-        let (width, height) = (grid.width().div_ceil(merge), grid.height().div_ceil(merge));
+        let cell_m = grid.resolution_m() * merge as f64;
+        let margin = (SEARCH_REACH_MAX_M / cell_m).ceil() as usize + 1;
+        let side = |num_cells: usize| num_cells.div_ceil(merge) + 2 * margin;
+        let (width, height) = (side(grid.width()), side(grid.height()));
         let mut codes = vec![0u8; width * height];
         let mut free = vec![false; width * height];
         for row in 0..grid.height() {
             for column in 0..grid.width() {
-                let cell = row / merge * width + column / merge;
+                let cell = (row / merge + margin) * width + column / merge + margin;
                 let (x, y) = (column as i64, row as i64);
                 codes[cell] = codes[cell].max(likelihood.code_at(&grid.center_of(x, y)));
                 free[cell] |= grid.state(x, y) == CellState::Free;
             }
         }
+        let margin_m = margin as f64 * cell_m;
         let mut pyramid = Self {
             width,
             height,
-            cell_m: grid.resolution_m() * merge as f64,
-            origin: grid.origin(),
+            margin,
+            cell_m,
+            origin: Point2::new(grid.origin().x - margin_m, grid.origin().y - margin_m),
             codes: vec![codes],
             free: vec![free],
         };
@@ -129,19 +141,23 @@ impl SearchPyramid {
     /// Poses at which `points`, given in the robot's frame, lie on obstacles of the map and the robot on free space,
     /// best first.
     pub fn search(&self, points: &[Point2], config: &GlobalSearchConfig) -> Vec<ScoredPose> {
+        let is_near = |point: &&Point2| point.x.hypot(point.y) <= SEARCH_REACH_MAX_M;
+        let points: Vec<Point2> = points.iter().filter(is_near).copied().collect();
         if points.is_empty() {
             return Vec::new();
         }
         let headings: Vec<f64> =
             (0..config.num_headings).map(|k| k as f64 * TAU / config.num_headings as f64).collect();
-        let turned: Vec<Vec<(i32, i32)>> =
-            headings.iter().map(|&heading| self.turned(points, heading)).collect();
-        let mut open = self.roots(&turned, config);
+        let turned: Vec<Vec<isize>> = headings.iter().map(|&heading| self.turned(&points, heading)).collect();
+        let best_sum = 255.0 * points.len() as f64;
+        let sum_min = (config.min_score * best_sum).ceil() as u32;
+        let mut open = self.roots(&turned, points.len(), sum_min);
         let mut num_squares = open.len();
         let mut found: Vec<ScoredPose> = Vec::new();
         while let Some(square) = open.pop() {
+            let score = f64::from(square.sum) / best_sum;
             let best = found.first().map_or(0.0, |first| first.score);
-            if square.score(points.len()) < config.min_score.max(best * config.min_share_of_best)
+            if score < best * config.min_share_of_best
                 || found.len() >= config.max_poses
                 || num_squares > config.max_squares
             {
@@ -152,35 +168,52 @@ impl SearchPyramid {
                 continue;
             }
             if square.level == 0 {
-                found.push(ScoredPose { map_from_robot: pose, score: square.score(points.len()) });
+                found.push(ScoredPose { map_from_robot: pose, score });
                 continue;
             }
-            for child in self.children(&square, &turned[square.heading as usize]) {
+            let level = square.level as usize - 1;
+            let side = 1usize << level;
+            for (dx, dy) in [(0, 0), (side, 0), (0, side), (side, side)] {
+                let corner = (square.x as usize + dx, square.y as usize + dy);
+                if !self.holds_robot(level, corner) {
+                    continue;
+                }
                 num_squares += 1;
-                open.push(child);
+                let child = self.square(level, corner, square.heading, &turned[square.heading as usize]);
+                if child.sum >= sum_min {
+                    open.push(child);
+                }
             }
         }
         found
     }
 
-    /// Points of the robot's frame as cells after a turn.
-    fn turned(&self, points: &[Point2], heading: f64) -> Vec<(i32, i32)> {
+    /// Points of the robot's frame after a turn, as steps from the robot's cell in the rows of cells.
+    fn turned(&self, points: &[Point2], heading: f64) -> Vec<isize> {
         let (sin, cos) = heading.sin_cos();
-        let cell = |meters: f64| (meters / self.cell_m).round() as i32;
-        points.iter().map(|p| (cell(cos * p.x - sin * p.y), cell(sin * p.x + cos * p.y))).collect()
+        let cell = |meters: f64| (meters / self.cell_m).round() as isize;
+        let step =
+            |p: &Point2| cell(sin * p.x + cos * p.y) * self.width as isize + cell(cos * p.x - sin * p.y);
+        points.iter().map(step).collect()
+    }
+
+    /// Whether a robot can stand in the square from a corner on; squares that begin in the margin are not searched.
+    fn holds_robot(&self, level: usize, (x, y): (usize, usize)) -> bool {
+        x + self.margin < self.width && y + self.margin < self.height && self.free[level][y * self.width + x]
     }
 
     /// All squares of the coarsest level in which a robot can stand and which are not bounded too low.
-    fn roots(&self, turned: &[Vec<(i32, i32)>], config: &GlobalSearchConfig) -> BinaryHeap<Square> {
+    fn roots(&self, turned: &[Vec<isize>], num_points: usize, sum_min: u32) -> OpenSquares {
         let level = NUM_LEVELS - 1;
         let side = 1usize << level;
-        let mut roots = BinaryHeap::new();
+        let mut roots = OpenSquares::new(num_points);
+        let rows = (self.margin..self.height - self.margin).step_by(side);
         let corners =
-            (0..self.height).step_by(side).flat_map(|y| (0..self.width).step_by(side).map(move |x| (x, y)));
-        for (x, y) in corners.filter(|&(x, y)| self.free[level][y * self.width + x]) {
-            for (heading, points) in turned.iter().enumerate() {
-                let square = self.square(level, (x, y), heading as u32, points);
-                if square.score(points.len()) >= config.min_score {
+            rows.flat_map(|y| (self.margin..self.width - self.margin).step_by(side).map(move |x| (x, y)));
+        for corner in corners.filter(|&corner| self.holds_robot(level, corner)) {
+            for (heading, steps) in turned.iter().enumerate() {
+                let square = self.square(level, corner, heading as u32, steps);
+                if square.sum >= sum_min {
                     roots.push(square);
                 }
             }
@@ -188,33 +221,12 @@ impl SearchPyramid {
         roots
     }
 
-    fn children(&self, square: &Square, points: &[(i32, i32)]) -> Vec<Square> {
-        let level = square.level as usize - 1;
-        let side = 1usize << level;
-        [(0, 0), (side, 0), (0, side), (side, side)]
-            .into_iter()
-            .map(|(dx, dy)| (square.x as usize + dx, square.y as usize + dy))
-            .filter(|&(x, y)| x < self.width && y < self.height && self.free[level][y * self.width + x])
-            .map(|corner| self.square(level, corner, square.heading, points))
-            .collect()
-    }
-
     /// A square with the sum of the best codes that its positions could give.
-    fn square(&self, level: usize, (x, y): (usize, usize), heading: u32, points: &[(i32, i32)]) -> Square {
+    fn square(&self, level: usize, (x, y): (usize, usize), heading: u32, steps: &[isize]) -> Square {
         let codes = &self.codes[level];
-        let (width, height) = (self.width as i32, self.height as i32);
-        let reach = (1i32 << level) - 1;
-        let sum = points
-            .iter()
-            .map(|&(dx, dy)| {
-                let (column, row) = (x as i32 + dx, y as i32 + dy);
-                if column < -reach || row < -reach || column >= width || row >= height {
-                    return 0;
-                }
-                // A square that begins before the map is bounded by the one that begins at its edge.
-                u32::from(codes[(row.max(0) * width + column.max(0)) as usize])
-            })
-            .sum();
+        let corner = y * self.width + x;
+        // The margin is as wide as points are far, so that every step ends on a cell.
+        let sum = steps.iter().map(|&step| u32::from(codes[corner.wrapping_add_signed(step)])).sum();
         Square { sum, level: level as u8, x: x as u32, y: y as u32, heading }
     }
 
@@ -272,25 +284,39 @@ struct Square {
     heading: u32,
 }
 
-impl Square {
-    fn score(&self, num_points: usize) -> f64 {
-        f64::from(self.sum) / (255.0 * num_points as f64)
-    }
+/// Squares that are not yet looked into, the best bound first; of equal ones the last that came, which is the finer.
+///
+/// Bounds are small whole numbers and never grow, so a list for each of them takes the place of a heap.
+#[derive(Debug)]
+struct OpenSquares {
+    by_sum: Vec<Vec<Square>>,
+    /// No list beyond this one holds anything.
+    top: usize,
+    num: usize,
 }
 
-impl Ord for Square {
-    /// The better bound first, then the finer square, then the place.
-    fn cmp(&self, other: &Self) -> Ordering {
-        let key = |square: &Self| {
-            (square.sum, std::cmp::Reverse((square.level, square.heading, square.y, square.x)))
-        };
-        key(self).cmp(&key(other))
+impl OpenSquares {
+    fn new(num_points: usize) -> Self {
+        Self { by_sum: vec![Vec::new(); 255 * num_points + 1], top: 0, num: 0 }
     }
-}
 
-impl PartialOrd for Square {
-    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
-        Some(self.cmp(other))
+    const fn len(&self) -> usize {
+        self.num
+    }
+
+    fn push(&mut self, square: Square) {
+        self.top = self.top.max(square.sum as usize);
+        self.num += 1;
+        self.by_sum[square.sum as usize].push(square);
+    }
+
+    fn pop(&mut self) -> Option<Square> {
+        while self.top > 0 && self.by_sum[self.top].is_empty() {
+            self.top -= 1;
+        }
+        let square = self.by_sum[self.top].pop()?;
+        self.num -= 1;
+        Some(square)
     }
 }
 
@@ -319,7 +345,8 @@ mod tests {
             let turned = pyramid.turned(&points, f64::from(heading) * TAU / 16.0);
             for (x, y) in (0..70).flat_map(|x| (0..50).map(move |y| (x, y))) {
                 if map.state(x as i64, y as i64) == CellState::Free {
-                    best = best.max(pyramid.square(0, (x, y), heading, &turned).sum);
+                    let cell = (x + pyramid.margin, y + pyramid.margin);
+                    best = best.max(pyramid.square(0, cell, heading, &turned).sum);
                 }
             }
         }
@@ -328,6 +355,8 @@ mod tests {
             "{:?} against {best}",
             found[0]
         );
+        let outside = pyramid.search(&[Point2::new(0.0, 1.5 * SEARCH_REACH_MAX_M)], &config);
+        assert!(outside.is_empty(), "farther than the margin is wide: {outside:?}");
         assert!(found.windows(2).all(|pair| pair[0].score >= pair[1].score));
     }
 }

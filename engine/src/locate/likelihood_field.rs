@@ -126,9 +126,9 @@ impl LikelihoodField {
 
     /// Code of the cell that holds a point: 0 far from obstacles or outside, 255 on one.
     pub fn code_at(&self, point: &Point2) -> u8 {
-        let column = ((point.x - self.origin.x) / self.resolution_m).floor();
-        let row = ((point.y - self.origin.y) / self.resolution_m).floor();
-        if column < 0.0 || row < 0.0 || column >= self.width as f64 || row >= self.height as f64 {
+        let column = (point.x - self.origin.x) / self.resolution_m;
+        let row = (point.y - self.origin.y) / self.resolution_m;
+        if !(column >= 0.0 && row >= 0.0 && column < self.width as f64 && row < self.height as f64) {
             return 0;
         }
         self.code(self.place(column as u32 + 1, row as u32 + 1))
@@ -151,8 +151,14 @@ impl LikelihoodField {
 
     /// Mean code of beam ends in the robot's frame, seen from a pose; 0 for none.
     pub fn mean_code(&self, points: &[Point2], map_from_robot: &Pose2) -> f64 {
-        let sum: u32 =
-            points.iter().map(|point| u32::from(self.code_at(&map_from_robot.transform_point(point)))).sum();
+        let (sin, cos) = map_from_robot.theta.sin_cos();
+        let placed = |point: &Point2| {
+            Point2::new(
+                map_from_robot.x + cos * point.x - sin * point.y,
+                map_from_robot.y + sin * point.x + cos * point.y,
+            )
+        };
+        let sum: u32 = points.iter().map(|point| u32::from(self.code_at(&placed(point)))).sum();
         if points.is_empty() { 0.0 } else { f64::from(sum) / points.len() as f64 }
     }
 }

@@ -2,10 +2,27 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::global_search::GlobalSearchConfig;
+use super::global_search::{GlobalSearchConfig, SEARCH_REACH_MAX_M};
+use super::pieces::ChainFit;
 use crate::config_error::ConfigError;
-use crate::recall::{NUM_FIT_FEATURES, fit_features};
+use crate::recall::{NUM_FIT_FEATURES, fit_features, logit};
 use crate::registration::{AreaFit, RefinerConfig};
+
+/// Numbers that a place of a session is judged by.
+pub const NUM_CHAIN_FEATURES: usize = NUM_FIT_FEATURES + 3;
+
+/// What a place is judged by, in numbers of the order of one: [`fit_features`] of all pieces as one, how far the followed
+/// pose lags behind the best, what the worst piece is contradicted in, and how much the pieces bend.
+pub fn chain_features(chain: &ChainFit, lag: f64) -> [f64; NUM_CHAIN_FEATURES] {
+    let mut features = [0.0; NUM_CHAIN_FEATURES];
+    features[..NUM_FIT_FEATURES].copy_from_slice(&fit_features(&chain.whole));
+    features[NUM_FIT_FEATURES..].copy_from_slice(&[
+        lag / 10.0,
+        logit(chain.worst_contradicted()),
+        (chain.bend_m + 0.02).ln(),
+    ]);
+    features
+}
 
 /// How a session judges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,6 +54,8 @@ pub struct LocalizerConfig {
     pub recall_every_m: f64,
     /// Travel between judgements of the best places, metres.
     pub judge_every_m: f64,
+    /// Length of the pieces that are laid into the map one after the other, metres.
+    pub piece_m: f64,
     /// The last metres that decide whether a place still fits.
     pub recent_m: f64,
     /// Agreement of these with the map, both ways, below which it does not.
@@ -46,8 +65,9 @@ pub struct LocalizerConfig {
     /// Judgements in a row that say so before the place is given up.
     pub num_contradictions_max: usize,
     /// Weights of what speaks for and against a place: how the last metres lie in the map
-    /// ([`fit_features`](crate::recall::fit_features)), and ten units of how far its followed pose lags behind the best.
-    pub weights: [f64; NUM_FIT_FEATURES + 1],
+    /// ([`fit_features`](crate::recall::fit_features)), how far its followed pose lags behind the best, what the worst piece is
+    /// contradicted in and how much the pieces bend ([`chain_features`]).
+    pub weights: [f64; NUM_CHAIN_FEATURES],
     /// Nobody is sure of a pose that can slide farther than this, one standard deviation, metres.
     pub sure_sd_max_m: f64,
     /// Travel without which nobody can be sure, metres.
@@ -76,11 +96,12 @@ impl Default for LocalizerConfig {
             agreement_elsewhere: 0.6,
             recall_every_m: 3.0,
             judge_every_m: 0.5,
+            piece_m: 6.0,
             recent_m: 1.0,
             recent_agreement_min: 0.75,
             recent_coverage_min: 0.4,
             num_contradictions_max: 2,
-            weights: [-7.47, -1.84, -1.98, 0.0, 2.03, 0.0, 0.90, 1.09],
+            weights: [-7.47, -1.84, -1.98, 0.0, 2.03, 0.0, 0.90, 1.09, 0.0, 0.0],
             sure_sd_max_m: 0.5,
             min_travel_m: 3.0,
             sure_probability: 0.99,
@@ -106,6 +127,7 @@ impl LocalizerConfig {
             ("sure_for_m", self.sure_for_m),
             ("recall_every_m", self.recall_every_m),
             ("judge_every_m", self.judge_every_m),
+            ("piece_m", self.piece_m),
             ("recent_m", self.recent_m),
             ("sure_sd_max_m", self.sure_sd_max_m),
         ];
@@ -126,6 +148,9 @@ impl LocalizerConfig {
                 return Err(ConfigError::new(format!("{path}.{name}"), "must lie in 0..=1"));
             }
         }
+        if self.search_range_m > SEARCH_REACH_MAX_M {
+            return Err(ConfigError::new(format!("{path}.search_range_m"), "must not exceed 20"));
+        }
         if self.max_points == 0 || self.max_search_points == 0 {
             return Err(ConfigError::new(
                 format!("{path}.max_points"),
@@ -143,10 +168,8 @@ impl LocalizerConfig {
     }
 
     /// Logarithm of the odds of a place against being nowhere in the map.
-    pub(super) fn log_odds(&self, fit: &AreaFit, lag: f64) -> f64 {
-        let by_fit: f64 =
-            self.weights.iter().zip(fit_features(fit)).map(|(weight, feature)| weight * feature).sum();
-        by_fit + self.weights[NUM_FIT_FEATURES] * lag / 10.0
+    pub(super) fn log_odds(&self, chain: &ChainFit, lag: f64) -> f64 {
+        self.weights.iter().zip(chain_features(chain, lag)).map(|(weight, feature)| weight * feature).sum()
     }
 
     /// Whether what was seen last can have been seen there.

@@ -7,8 +7,8 @@
 //!      ─► probabilities, "not in this map" among them ─► lost, ambiguous or converged
 //! ```
 //!
-//! The scans of the last metres are laid into the map as one submap, every cell once: a long corridor seen for the
-//! hundredth time is no new evidence. Returns where the map knows free space, surfaces of the map that the robot saw
+//! The scans of the last metres are laid into the map in a few pieces, in each every cell once: a long corridor seen for
+//! the hundredth time is no new evidence. Returns where the map knows free space, surfaces of the map that the robot saw
 //! through and space beyond the map all count against a place.
 
 use std::collections::VecDeque;
@@ -16,6 +16,7 @@ use std::sync::Arc;
 
 use super::component_tracks::ComponentTracks;
 use super::localizer_config::LocalizerConfig;
+use super::pieces::{ChainFit, FinishedPieces, Piece, lay_chain};
 use super::prior::PosePrior;
 use super::served_map::ServedMap;
 use super::session_answer::{Hypothesis, LocalizationEstimate, LocalizationState, Missing};
@@ -24,19 +25,21 @@ use super::surroundings::surroundings;
 use super::sweep::Sweep;
 use super::track::Moment;
 use crate::geometry::{Point2, Pose2, angle_between};
-use crate::recall::{Calibration, Example, PlaceIndex, RecallConfig, RecentScans, worst_sd_m};
-use crate::registration::{AreaFit, OdometryRefiner, Submap, SubmapScan};
+use crate::recall::{Calibration, Example, PlaceIndex, RecallConfig, RecentScans};
+use crate::registration::{AreaFit, OdometryRefiner, SubmapConfig};
 use crate::scan::{Scan, ScanGeometry};
 use crate::translator::TranslatorConfig;
 
 /// Places laid into the map each time, of all components together.
 const NUM_JUDGED_MAX: usize = 6;
-/// Scans that are laid into the map as one, at most.
-const NUM_JUDGED_SCANS_MAX: usize = 60;
 /// Two fits closer than this are one place, metres and radians.
 const SAME_FIT: (f64, f64) = (0.3, 0.1);
 /// A place found again within this of where it was expected is the same, metres and radians.
 const SAME_LEADER: (f64, f64) = (0.6, 0.25);
+/// Metres between two searches for each metre since the session began or began anew.
+const SEARCH_INTERVAL: f64 = 0.25;
+/// A piece that has just begun reaches back at least so far, metres.
+const NEWEST_PIECE_MIN_M: f64 = 3.0;
 /// Travel before anything is looked for, metres.
 const FIRST_SEARCH_M: f64 = 0.8;
 /// Less probable places are not answered.
@@ -72,7 +75,7 @@ pub struct JudgedPlace {
     /// How far the evidence of the followed pose lags behind that of the best place, natural logarithm, at most 0.
     pub lag: f64,
     /// How the last metres lie in the map.
-    pub fit: AreaFit,
+    pub chain: ChainFit,
     /// How what was seen last does.
     pub recent_fit: Option<AreaFit>,
     /// Logarithm of the odds against being nowhere in the map.
@@ -91,10 +94,13 @@ pub struct SiteSession {
     refiner: OdometryRefiner,
     moments: VecDeque<Moment>,
     recent: RecentScans,
+    finished: FinishedPieces,
     parts: Vec<ComponentTracks>,
     run_from_start: Option<Pose2>,
     run_from_robot: Pose2,
     travel_m: f64,
+    /// Travel when the session began, or began anew.
+    began_at_m: f64,
     searched_at_m: Option<f64>,
     recalled_at_m: f64,
     judged_at_m: Option<f64>,
@@ -127,10 +133,12 @@ impl SiteSession {
             index: map.index,
             prior,
             moments: VecDeque::new(),
+            finished: FinishedPieces::default(),
             parts: map.components.into_iter().map(tracks).collect(),
             run_from_start: None,
             run_from_robot: Pose2::identity(),
             travel_m: 0.0,
+            began_at_m: 0.0,
             searched_at_m: None,
             recalled_at_m: 0.0,
             judged_at_m: None,
@@ -153,6 +161,7 @@ impl SiteSession {
             return;
         }
         self.remember(scan);
+        self.finish_piece();
         let config = Arc::clone(&self.config);
         for part in &mut self.parts {
             part.follow(&self.moments, &config.localizer);
@@ -264,12 +273,24 @@ impl SiteSession {
         }
     }
 
+    /// Ends the piece that is being driven when it is long enough.
+    fn finish_piece(&mut self) {
+        let (piece_m, history_m) = (self.settings().piece_m, self.settings().history_m);
+        if self.travel_m - self.finished.until_m() >= piece_m {
+            let piece = self.piece_since(self.finished.until_m());
+            let num_max = (history_m / piece_m) as usize;
+            self.finished.push(piece, self.travel_m, num_max);
+        }
+    }
+
     /// Searches the map, and asks where the last metres were driven, each time some metres were driven.
     fn look_for_places(&mut self) {
         let config = Arc::clone(&self.config);
         let settings = &config.localizer;
         let is_found = self.state == LocalizationState::Converged;
-        let every_m = if is_found { settings.history_m / 2.0 } else { settings.search_every_m };
+        // What a search did not propose the next ones hardly will: they become rarer with the way.
+        let every_m = (SEARCH_INTERVAL * (self.travel_m - self.began_at_m)).max(settings.search_every_m);
+        let every_m = if is_found { settings.history_m / 2.0 } else { every_m.min(settings.history_m / 2.0) };
         if self.travel_m >= FIRST_SEARCH_M && is_due(self.searched_at_m, every_m, self.travel_m) {
             self.searched_at_m = Some(self.travel_m);
             for part in &mut self.parts {
@@ -315,13 +336,15 @@ impl SiteSession {
         }
         best.sort_by(|a, b| b.0.total_cmp(&a.0));
         best.truncate(NUM_JUDGED_MAX);
-        let whole = self.submap_of(settings.history_m);
-        let recent = self.submap_of(settings.recent_m);
+        let newest = self.piece_since(
+            self.finished.until_m().min(self.travel_m - NEWEST_PIECE_MIN_M).max(self.began_at_m),
+        );
+        let recent = self.piece_since(self.travel_m - settings.recent_m);
         let mut judged: Vec<JudgedPlace> = Vec::new();
         let best_evidence = best.first().map_or(0.0, |place| place.0);
         for (evidence, component, map_from_robot) in best {
             let lag = evidence - best_evidence;
-            if let Some(place) = self.laid_into_map(component, map_from_robot, lag, (&whole, &recent))
+            if let Some(place) = self.laid_into_map(component, map_from_robot, lag, (&newest, &recent))
                 && !judged.iter().any(|known| is_same_fit(known, &place))
             {
                 judged.push(place);
@@ -351,39 +374,38 @@ impl SiteSession {
         component: u32,
         map_from_robot: Pose2,
         lag: f64,
-        (whole, recent): (&(Pose2, Submap), &(Pose2, Submap)),
+        (newest, recent): (&Piece, &Piece),
     ) -> Option<JudgedPlace> {
         let map_from_run = map_from_robot.compose(&self.run_from_robot.inverse());
-        let fit = |(run_from_submap, submap): &(Pose2, Submap)| {
-            let start = map_from_run.compose(run_from_submap);
-            self.index.fit(component, submap, &start, &self.config.recall.submap)
-        };
-        let fit_of_all = fit(whole)?;
+        let map = (&*self.index, component, self.submap_config());
+        let since = self.since_judged();
+        let known = self.judged.iter().find(|place| {
+            place.component == component
+                && is_near(&place.map_from_robot.compose(&since), &map_from_robot, SAME_LEADER)
+        });
+        let chain = lay_chain(newest, &self.finished, map, &map_from_run, known.map(|place| &place.chain))?;
         let start = self.map_from_start(&map_from_robot, &self.run_from_robot);
         let declared = self.prior.as_ref().map_or(0.0, |prior| prior.log_odds(component, &start));
         Some(JudgedPlace {
             component,
             map_from_robot,
             lag,
-            recent_fit: fit(recent),
-            log_odds: self.settings().log_odds(&fit_of_all, lag) + declared,
-            fit: fit_of_all,
+            recent_fit: recent.fit(map, &map_from_run),
+            log_odds: self.settings().log_odds(&chain, lag) + declared,
+            chain,
             probability: 0.0,
         })
     }
 
-    /// What the last metres saw, in the frame of the moment in their middle, and that moment.
-    fn submap_of(&self, length_m: f64) -> (Pose2, Submap) {
-        let first = self.moments.partition_point(|moment| moment.travel_m < self.travel_m - length_m);
-        let num = self.moments.len() - first;
-        let middle =
-            self.moments.get(first + num / 2).map_or_else(Pose2::identity, |moment| moment.run_from_robot);
-        let stride = num.div_ceil(NUM_JUDGED_SCANS_MAX).max(1);
-        let members = self.moments.iter().skip(first).step_by(stride);
-        let scans: Vec<SubmapScan<'_>> = members
-            .map(|moment| SubmapScan { frame_from_robot: moment.run_from_robot, ranges_m: &moment.ranges_m })
-            .collect();
-        (middle, Submap::new(&self.geometry, &scans, &middle, &self.config.recall.submap))
+    fn submap_config(&self) -> &SubmapConfig {
+        &self.config.recall.submap
+    }
+
+    /// The piece driven from some travel on.
+    fn piece_since(&self, from_m: f64) -> Piece {
+        let first = self.moments.partition_point(|moment| moment.travel_m < from_m);
+        let number = self.finished.num_ever();
+        Piece::of(number, self.moments.range(first..), &self.geometry, self.submap_config())
     }
 
     /// Says whether the robot is found and what is missing, and gives up a place that what is seen now contradicts.
@@ -401,7 +423,7 @@ impl SiteSession {
         let second = self.judged.get(1).map_or(0.0, |place| place.probability);
         let is_contradicted = !best.recent_fit.as_ref().is_some_and(|fit| settings.accepts_recent(fit));
         let leads = best.probability >= settings.leading_probability && !is_contradicted;
-        let sd_m = worst_sd_m(&best.fit.covariance);
+        let sd_m = best.chain.sd_m;
         self.leading_since_m = if leads { self.leading_since_m.or(Some(self.travel_m)) } else { None };
         let has_lasted = self.leading_since_m.is_some_and(|at_m| self.travel_m - at_m >= settings.sure_for_m);
         let reasons = [
@@ -422,6 +444,12 @@ impl SiteSession {
             (false, true) => LocalizationState::Ambiguous,
             (false, false) => LocalizationState::Lost,
         };
+        // Whoever is not sure does not say so: what one place has too much is not in this map.
+        if self.state == LocalizationState::Ambiguous
+            && let Some(best) = self.judged.first_mut()
+        {
+            best.probability = best.probability.min(config.localizer.leading_probability);
+        }
         self.num_contradictions = if is_contradicted && (was_found || self.num_contradictions > 0) {
             self.num_contradictions + 1
         } else {
@@ -437,6 +465,8 @@ impl SiteSession {
         let recent_m = self.travel_m - self.settings().recent_m;
         self.forget(self.moments.partition_point(|moment| moment.travel_m < recent_m));
         self.parts.iter_mut().for_each(|part| part.tracks.clear());
+        self.began_at_m = recent_m;
+        self.finished.clear(recent_m);
         self.recent = RecentScans::new(self.config.recall.length_max_m);
         self.judged.clear();
         (self.searched_at_m, self.leading_since_m, self.prior) = (None, None, None);
@@ -450,7 +480,8 @@ fn is_due(last_m: Option<f64>, every_m: f64, travel_m: f64) -> bool {
 }
 
 fn is_same_fit(a: &JudgedPlace, b: &JudgedPlace) -> bool {
-    a.component == b.component && is_near(&a.fit.map_from_submap, &b.fit.map_from_submap, SAME_FIT)
+    a.component == b.component
+        && is_near(&a.chain.whole.map_from_submap, &b.chain.whole.map_from_submap, SAME_FIT)
 }
 
 fn is_near(a: &Pose2, b: &Pose2, (within_m, within_rad): (f64, f64)) -> bool {

@@ -25,7 +25,7 @@ pub fn fit_features(fit: &AreaFit) -> [f64; NUM_FIT_FEATURES] {
 }
 
 /// Logarithm of the odds of a share, within bounds.
-fn logit(share: f64) -> f64 {
+pub(crate) fn logit(share: f64) -> f64 {
     let share = share.clamp(0.002, 0.998);
     (share / (1.0 - share)).ln()
 }

@@ -21,6 +21,7 @@ mod recent_scans;
 mod tests;
 
 pub use answer::{AnsweredPlace, ExampleAnswer, LocalizationState, settle, worst_sd_m};
+pub(crate) use calibration::logit;
 pub use calibration::{Calibration, NUM_FEATURES, NUM_FIT_FEATURES, PlaceEvidence, fit_features};
 pub use config::RecallConfig;
 pub use example::Example;

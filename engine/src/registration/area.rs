@@ -29,6 +29,9 @@ const SURFACE_SHARE: f64 = 0.15;
 /// A cell takes no more points into its surface than this, so that sums stay small.
 const NUM_HITS_MAX: u8 = 200;
 
+/// Variance of a pose that nothing speaks of, square metres and square radians.
+const NOTHING_KNOWN_VARIANCE: f64 = 100.0;
+
 /// Every how many cells, along rows and columns, free space of a recording is compared.
 const FREE_STRIDE: usize = 3;
 
@@ -178,9 +181,55 @@ pub struct AreaFit {
     pub beyond: f64,
     /// Returns about which the map has an opinion.
     pub num_opinions: u32,
+    /// Returns of the recording.
+    pub num_returns: u32,
+    /// Surfaces of the map about which the recording has an opinion.
+    pub num_surfaces: u32,
+    /// Pieces of free space that the recording saw.
+    pub num_free: u32,
 }
 
 impl AreaFit {
+    /// A recording that lies where nothing is known.
+    pub fn of_unknown(submap: &Submap, map_from_submap: &Pose2) -> Self {
+        Self {
+            map_from_submap: *map_from_submap,
+            covariance: Matrix3::identity() * NOTHING_KNOWN_VARIANCE,
+            coverage: 0.0,
+            contradicted: 0.0,
+            contradicts: 0.0,
+            exact: 0.0,
+            beyond: 1.0,
+            num_opinions: 0,
+            num_returns: submap.fine_points.len() as u32,
+            num_surfaces: 0,
+            num_free: submap.evidence.free_points(FREE_STRIDE).len() as u32,
+        }
+    }
+
+    /// How several pieces of one drive lie, as if they were one; pose and covariance are those of this piece.
+    pub fn pooled_with(&self, others: &[Self]) -> Self {
+        let all = || std::iter::once(self).chain(others);
+        // A mean over pieces, each with a weight.
+        let mean = |weight: &dyn Fn(&Self) -> f64, value: &dyn Fn(&Self) -> f64| {
+            let total: f64 = all().map(weight).sum();
+            all().map(|fit| weight(fit) * value(fit)).sum::<f64>() / total.max(1.0)
+        };
+        let by_opinions = |fit: &Self| f64::from(fit.num_opinions);
+        Self {
+            coverage: mean(&|fit| f64::from(fit.num_returns), &|fit| fit.coverage),
+            contradicted: mean(&by_opinions, &|fit| fit.contradicted),
+            contradicts: mean(&|fit| f64::from(fit.num_surfaces), &|fit| fit.contradicts),
+            exact: mean(&by_opinions, &|fit| fit.exact),
+            beyond: mean(&|fit| f64::from(fit.num_free), &|fit| fit.beyond),
+            num_opinions: all().map(|fit| fit.num_opinions).sum(),
+            num_returns: all().map(|fit| fit.num_returns).sum(),
+            num_surfaces: all().map(|fit| fit.num_surfaces).sum(),
+            num_free: all().map(|fit| fit.num_free).sum(),
+            ..*self
+        }
+    }
+
     /// Share of all opinions, both ways, that agree.
     pub fn agreement(&self) -> f64 {
         1.0 - 0.5 * (self.contradicted + self.contradicts)
@@ -210,7 +259,8 @@ impl Area {
         window: &SearchWindow,
         settings: &AreaSearch,
     ) -> Option<(Pose2, f64)> {
-        let (corner, pyramid) = self.cut(&window.center, settings.reach_m + window.half_m);
+        let (corner, pyramid) =
+            self.cut(&window.center, settings.reach_m + window.half_m, SearchPyramid::new);
         let center = Pose2::new(window.center.x - corner.x, window.center.y - corner.y, window.center.theta);
         let around = SearchWindow { center, ..*window };
         let (found, share) =
@@ -233,7 +283,7 @@ impl Area {
         let surface_at = |point: &Point2| self.surfaces.surface_at(point, config.min_count);
         let found = align(surface_at, &points, &prior, start, &alignment_settings(config));
         let pose = found.map_from_points;
-        let (corner, pyramid) = self.cut(&pose, config.radius_m + config.spread_half_m);
+        let (corner, pyramid) = self.cut(&pose, config.radius_m + config.spread_half_m, SearchPyramid::flat);
         let local = Pose2::new(pose.x - corner.x, pose.y - corner.y, pose.theta);
         let mut covariance = found.information.try_inverse()?;
         let mut place = covariance.fixed_view_mut::<2, 2>(0, 0);
@@ -242,6 +292,7 @@ impl Area {
         let of_recording = self.opinions(&submap.fine_points, &pose);
         let of_area = Tally::count(&submap.evidence, &self.surface_points(&pose, config), &pose.inverse());
         let num_opinions = of_recording.num_confirmed + of_recording.num_contradicted;
+        let free_points = submap.evidence.free_points(FREE_STRIDE);
         (num_opinions > 0).then(|| AreaFit {
             map_from_submap: pose,
             covariance,
@@ -249,8 +300,11 @@ impl Area {
             contradicted: of_recording.contradiction(),
             contradicts: of_area.contradiction(),
             exact: self.exact_share(&submap.fine_points, &pose, of_recording.num_confirmed),
-            beyond: self.unknown_share(&submap.evidence.free_points(FREE_STRIDE), &pose),
+            beyond: self.unknown_share(&free_points, &pose),
             num_opinions,
+            num_returns: submap.fine_points.len() as u32,
+            num_surfaces: of_area.num_confirmed + of_area.num_contradicted,
+            num_free: free_points.len() as u32,
         })
     }
 
@@ -297,7 +351,12 @@ impl Area {
     }
 
     /// The search pyramid of the cells around a pose, and where its origin lies in the map.
-    fn cut(&self, center: &Pose2, radius_m: f64) -> (Point2, SearchPyramid) {
+    fn cut(
+        &self,
+        center: &Pose2,
+        radius_m: f64,
+        pyramid_of: impl Fn(&EvidenceGrid) -> SearchPyramid,
+    ) -> (Point2, SearchPyramid) {
         let middle = cell_at(center.x, center.y, self.cell_m);
         let mut grid = EvidenceGrid::new(radius_m, self.cell_m);
         let (half, side) = (grid.half(), 2 * grid.half() + 1);
@@ -310,7 +369,7 @@ impl Area {
             }
         });
         let corner = Point2::new(f64::from(middle.0) * self.cell_m, f64::from(middle.1) * self.cell_m);
-        (corner, SearchPyramid::new(&grid))
+        (corner, pyramid_of(&grid))
     }
 
     /// Visits the square of `side` cells from a lower left cell on, in pieces of rows that one tile holds.
@@ -362,4 +421,33 @@ fn tile_of(cell: (i32, i32)) -> TileKey {
 
 fn offset_of(cell: (i32, i32)) -> usize {
     (cell.1.rem_euclid(TILE) * TILE + cell.0.rem_euclid(TILE)) as usize
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_count_by_what_they_saw() {
+        let fit = |contradicted: f64, num_opinions: u32, beyond: f64, num_free: u32| AreaFit {
+            map_from_submap: Pose2::new(f64::from(num_free), 0.0, 0.0),
+            covariance: Matrix3::identity(),
+            coverage: 0.5,
+            contradicted,
+            contradicts: 0.0,
+            exact: 1.0,
+            beyond,
+            num_opinions,
+            num_returns: 2 * num_opinions,
+            num_surfaces: 0,
+            num_free,
+        };
+        let newest = fit(0.1, 300, 0.0, 10);
+        let pooled = newest.pooled_with(&[fit(0.5, 100, 1.0, 30)]);
+        assert!((pooled.contradicted - 0.2).abs() < 1e-12, "{pooled:?}");
+        assert!((pooled.beyond - 0.75).abs() < 1e-12, "{pooled:?}");
+        assert_eq!((pooled.num_opinions, pooled.contradicts, pooled.coverage), (400, 0.0, 0.5));
+        assert_eq!(pooled.map_from_submap, newest.map_from_submap);
+        assert_eq!(newest.pooled_with(&[]), newest);
+    }
 }

@@ -50,14 +50,19 @@ struct Best {
 impl SearchPyramid {
     /// The pyramid over the hits of a grid, with cells twice as large: the alignment that follows finds the rest.
     pub fn new(grid: &EvidenceGrid) -> Self {
-        let half = grid.half().div_euclid(2) + 1;
-        let side = 2 * half + 1;
-        let mut levels = vec![halved(grid, half)];
+        let mut pyramid = Self::flat(grid);
         for level in 1..NUM_LEVELS {
             let reach = 1usize << (level - 1);
-            levels.push(widened(&levels[level - 1], side as usize, reach));
+            let wider = widened(&pyramid.levels[level - 1], pyramid.side as usize, reach);
+            pyramid.levels.push(wider);
         }
-        Self { cell_m: 2.0 * grid.cell_m(), half, side, levels }
+        pyramid
+    }
+
+    /// Its lowest level alone, which is all that [`SearchPyramid::spread`] reads.
+    pub fn flat(grid: &EvidenceGrid) -> Self {
+        let half = grid.half().div_euclid(2) + 1;
+        Self { cell_m: 2.0 * grid.cell_m(), half, side: 2 * half + 1, levels: vec![halved(grid, half)] }
     }
 
     /// The pose of highest worth, and that worth as a share of the highest possible; none when nothing falls onto a

@@ -92,6 +92,11 @@ impl EvidenceGrid {
         }
     }
 
+    /// Beams that passed the cell of a point, up to 255; outside the grid none.
+    pub fn num_passes(&self, point: &Point2) -> u8 {
+        self.index_of(point.x, point.y).map_or(0, |index| self.passes[index])
+    }
+
     /// Centres of cells that were seen free, of every `stride`-th row and column.
     pub fn free_points(&self, stride: usize) -> Vec<Point2> {
         let lattice = (0..self.side)

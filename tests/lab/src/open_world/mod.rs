@@ -12,7 +12,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use locution_engine::config::EngineConfig;
-use locution_engine::geometry::{Pose2, angle_between};
+use locution_engine::geometry::Pose2;
 use locution_engine::locate::{LocalizationState, SessionConfig, SiteSession};
 use locution_engine::scan::Scan;
 use rand::{RngExt, SeedableRng};
@@ -20,17 +20,14 @@ use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use self::features::FeatureLog;
-pub use self::prepared::{Part, PreparedMap};
+pub use self::prepared::{Part, PreparedMap, Whereabouts};
 use crate::evaluation::{OpenWorldReport, OpenWorldStep, OpenWorldTrial, judge_open_world};
 use crate::report::{table, write_json};
 
 /// A robot asks where it is each time it has driven so far, metres.
 const ASK_EVERY_M: f64 = 0.5;
-/// Nearer than this is right.
-const RIGHT_M: f64 = 0.5;
-/// A heading closer than this is right.
-const RIGHT_DEG: f64 = 10.0;
-
+/// Metres from power-on that are asked about by example, too, when features are written.
+const EXAMPLE_M: f64 = 12.0;
 /// Which robots on which maps.
 #[derive(Debug, Args)]
 pub struct OpenWorldArguments {
@@ -156,6 +153,7 @@ fn drive(
     let mut odom_from_recorded = Pose2::identity();
     let mut before: Option<(usize, Pose2)> = None;
     let mut asked_m = 0.0;
+    let mut driven: Vec<Scan> = Vec::new();
     for &idx in way {
         let scan = &robots.scans[idx];
         if let Some((last, odom_from_robot)) = before
@@ -166,33 +164,33 @@ fn drive(
         }
         let odom_from_robot = odom_from_recorded.compose(&scan.odom_from_robot);
         before = Some((idx, odom_from_robot));
-        session.push(&Scan { odom_from_robot, ..scan.clone() });
+        driven.push(Scan { odom_from_robot, ..scan.clone() });
+        session.push(&driven[driven.len() - 1]);
         if session.travel_m() - asked_m < ASK_EVERY_M {
             continue;
         }
+        let is_example = asked_m < EXAMPLE_M && session.travel_m() >= EXAMPLE_M;
         asked_m = session.travel_m();
-        let expected = map.expected(robots, idx);
-        trial.steps.push(step(&session, expected));
-        log.write(&session, expected, |pose| is_right(pose, expected))?;
+        let truth = map.whereabouts(robots, idx);
+        if is_example && trial.carried_at_m.is_none() {
+            let recording = (&robots.geometry, &driven[..]);
+            let index = &map.session_map.index;
+            log.write_example(recording, index, config, &truth)?;
+        }
+        trial.steps.push(step(&session, &truth));
+        log.write(&session, &truth)?;
     }
     Ok(trial)
 }
 
-fn step(session: &SiteSession, expected: Option<Option<Pose2>>) -> OpenWorldStep {
+fn step(session: &SiteSession, truth: &Whereabouts) -> OpenWorldStep {
     let best = session.judged().first().map(|best| best.map_from_robot.compose(&session.since_judged()));
     OpenWorldStep {
         travel_m: session.travel_m(),
-        is_on_map: expected.map(|pose| pose.is_some()),
+        is_on_map: truth.is_on_map,
         is_sure: session.state() == LocalizationState::Converged,
-        is_right: best.is_some_and(|pose| is_right(&pose, expected)),
+        is_right: best.is_some_and(|pose| truth.is_right(&pose)),
     }
-}
-
-fn is_right(pose: &Pose2, expected: Option<Option<Pose2>>) -> bool {
-    expected.flatten().is_some_and(|expected| {
-        pose.distance(&expected) < RIGHT_M
-            && angle_between(pose.theta, expected.theta) < RIGHT_DEG.to_radians()
-    })
 }
 
 fn report_table(reports: &[PairReport]) -> String {

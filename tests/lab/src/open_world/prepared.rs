@@ -6,7 +6,7 @@ use std::sync::Arc;
 use anyhow::{Context, Result, ensure};
 use locution_engine::config::EngineConfig;
 use locution_engine::formats::CarmenOptions;
-use locution_engine::geometry::Pose2;
+use locution_engine::geometry::{Pose2, angle_between};
 use locution_engine::locate::{ServedMap, SessionMap};
 use locution_engine::mapping::{
     Keyframe, MappedRun, RegistrationMemo, RunRecord, map_site, place_observations,
@@ -23,6 +23,12 @@ use crate::recordings::{read_recording, read_truth};
 /// Nearer than this to where the map has been a robot is on it, metres; farther than twice this it is not; between the
 /// two nobody can say.
 const ON_MAP_M: f64 = 2.0;
+/// Nearer than this is right where the map has been, metres …
+const RIGHT_M: f64 = 0.5;
+/// … and so much more for each metre off it: headings of maps and truths err by some degrees.
+const RIGHT_SLOPE: f64 = 0.05;
+/// A heading closer than this is right.
+const RIGHT_DEG: f64 = 10.0;
 
 /// A part of a recording.
 pub struct Part {
@@ -151,20 +157,48 @@ impl PreparedMap {
         Ok(Self { building: part.building.clone(), session_map, pairs })
     }
 
-    /// Where in the map a scan of a part was made: the outer none when nobody can say, the inner none when not here.
-    /// The nearest mapped place says so, so that a map that is bent far away is right here.
-    pub fn expected(&self, part: &Part, scan: usize) -> Option<Option<Pose2>> {
+    /// Where in the map a scan of a part was made. The nearest mapped place says so, so that a map that is bent far away
+    /// is right here.
+    pub fn whereabouts(&self, part: &Part, scan: usize) -> Whereabouts {
+        let elsewhere = Whereabouts { is_on_map: Some(false), map_from_robot: None, right_within_m: 0.0 };
         if part.building != self.building {
-            return Some(None);
+            return elsewhere;
         }
-        let truth = part.truth[scan]?;
+        let Some(truth) = part.truth[scan] else { return Whereabouts { is_on_map: None, ..elsewhere } };
         let nearest = self.pairs.iter().min_by(|a, b| a.0.distance(&truth).total_cmp(&b.0.distance(&truth)));
-        let (known, map_pose) = nearest?;
-        match known.distance(&truth) {
-            near if near < ON_MAP_M => Some(Some(map_pose.compose(&known.between(&truth)))),
-            far if far > 2.0 * ON_MAP_M => Some(None),
-            _ => None,
+        let Some((known, map_pose)) = nearest else { return elsewhere };
+        let off_m = known.distance(&truth);
+        Whereabouts {
+            is_on_map: match off_m {
+                near if near < ON_MAP_M => Some(true),
+                far if far > 2.0 * ON_MAP_M => Some(false),
+                _ => None,
+            },
+            map_from_robot: Some(map_pose.compose(&known.between(&truth))),
+            right_within_m: RIGHT_M + RIGHT_SLOPE * (off_m - ON_MAP_M).max(0.0),
         }
+    }
+}
+
+/// Where a robot truly is, as far as a map is concerned.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Whereabouts {
+    /// Whether the map has been there; none where nobody can say.
+    pub is_on_map: Option<bool>,
+    /// Its true pose in the map's frame; none in another building, or when it is not known. A laser sees farther than its
+    /// robot drives, so a robot can be right where the map has not been.
+    pub map_from_robot: Option<Pose2>,
+    /// A pose within this of it is right, metres: more, the farther the next mapped place is.
+    pub right_within_m: f64,
+}
+
+impl Whereabouts {
+    /// Whether an answer is right.
+    pub fn is_right(&self, map_from_robot: &Pose2) -> bool {
+        self.map_from_robot.is_some_and(|truth| {
+            map_from_robot.distance(&truth) < self.right_within_m
+                && angle_between(map_from_robot.theta, truth.theta) < RIGHT_DEG.to_radians()
+        })
     }
 }
 
