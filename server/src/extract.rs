@@ -82,8 +82,12 @@ fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
 }
 
 fn parse_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
-    if let Ok(value) = ciborium::from_reader(bytes) {
-        return Ok(value);
+    let mut rest = bytes;
+    if let Ok(value) = ciborium::from_reader(&mut rest) {
+        return match rest.len() {
+            0 => Ok(value),
+            num_bytes => Err(ApiError::malformed(format!("{num_bytes} bytes follow the CBOR of the body"))),
+        };
     }
     match ciborium::from_reader::<Located<T>, _>(bytes) {
         Ok(Located(value)) => Ok(value),

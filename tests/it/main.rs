@@ -9,6 +9,7 @@ mod crash;
 mod damage;
 mod disk_full;
 mod documentation;
+mod lasers;
 mod maps;
 mod power_cut;
 mod sites;

@@ -9,6 +9,7 @@ use super::codec;
 use super::keys::{Generation, Key, MapVersion, RunIdx};
 use super::map::Map;
 use super::run::Run;
+use super::stored::RunRecord;
 use crate::storage::{Reader, StorageError};
 
 /// Reads a site's runs and maps, either as they stand or as they stood at a snapshot.

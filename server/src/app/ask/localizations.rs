@@ -21,7 +21,7 @@ use super::examples::invalid_geometry;
 use crate::app::runs::NewBatch;
 use crate::app::site::Site;
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::Map;
+use crate::records::{Map, ReadingRules};
 
 /// Components that a session looks at, the largest first.
 const NUM_COMPONENTS_MAX: usize = 4;
@@ -77,6 +77,7 @@ struct SessionTable {
 struct Session {
     site: String,
     geometry: ScanGeometry,
+    readings: ReadingRules,
     map_version: u64,
     latest_use: Mutex<Instant>,
     search: tokio::sync::Mutex<Search>,
@@ -197,6 +198,7 @@ impl App {
         &self,
         site: &Site,
         geometry: ScanGeometry,
+        readings: ReadingRules,
     ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
@@ -204,6 +206,7 @@ impl App {
         let session = Session {
             site: site.name().to_string(),
             geometry,
+            readings,
             map_version: map.record.version,
             latest_use: Mutex::new(Instant::now()),
             search: tokio::sync::Mutex::new(search),
@@ -252,7 +255,12 @@ impl App {
         }
         let num_known = (expected_sequence - batch.first_sequence) as usize;
         let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = batch.checked(&session.geometry, num_known, search.latest_odom, step_max_m)?;
+        let scans = batch.checked(
+            (&session.geometry, &session.readings),
+            num_known,
+            search.latest_odom,
+            step_max_m,
+        )?;
         let mut feeding = search.clone();
         *search = on_blocking_thread(move || {
             feeding.push(&scans);

@@ -28,7 +28,7 @@ pub use jobs::{JobInfo, Jobs, Progress};
 pub use run_writer::{RunWriter, WriterState};
 pub use state::{SiteState, TextConfig};
 pub use texts::{Segment, SiteTexts};
-pub use translation::RunTranslator;
+pub use translation::{RunTranslator, Translated};
 
 /// A site that is open.
 pub struct Site {

@@ -8,7 +8,7 @@ use locution_engine::locate::LocalizationState;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::batches::{BatchDto, ScanDto};
+use super::batches::{BatchDto, ScanDto, checked_batch};
 use super::runs::GeometryDto;
 use crate::app::AppError;
 use crate::app::ask::{ExampleInfo, ExamplePlace, LocalizationInfo};
@@ -122,8 +122,7 @@ impl ExampleQueryDto {
     /// # Errors
     /// 422 naming scan and field.
     pub fn batch(self) -> Result<NewBatch, ApiError> {
-        let scans = self.scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
-        Ok(NewBatch { first_sequence: 0, scans: scans.collect::<Result<_, _>>()? })
+        checked_batch(0, self.scans)
     }
 }
 
@@ -231,8 +230,8 @@ pub async fn open_localization(
     SiteOf(site): SiteOf,
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
-    let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.open_localization(&site, geometry).await?;
+    let (geometry, readings) = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let info = state.app.open_localization(&site, geometry, readings).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }
@@ -286,8 +285,8 @@ pub async fn query_example(
     BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<ExampleAnswerDto>, ApiError> {
-    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let answers = state.app.find_example(&[site], &geometry, query.batch()?).await?;
+    let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let answers = state.app.find_example(&[site], (&geometry, &readings), query.batch()?).await?;
     let answer = answers.into_iter().next().ok_or_else(|| AppError::internal("a site without an answer"))?;
     Ok(Json(answer.into()))
 }
@@ -302,8 +301,8 @@ pub async fn query_example_everywhere(
     BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
-    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let sites = state.app.sites(|name| identity.may_see(name)).await?;
-    let answers = state.app.find_example(&sites, &geometry, query.batch()?).await?;
+    let answers = state.app.find_example(&sites, (&geometry, &readings), query.batch()?).await?;
     Ok(Json(answers.into_iter().map(ExampleAnswerDto::from).collect()))
 }
