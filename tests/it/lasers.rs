@@ -75,7 +75,7 @@ async fn minus_infinity_is_too_near_to_tell() {
     assert_eq!(stored["items"][0]["ranges_m"][0], 0.0);
     // Two batches one after the other are no batch.
     let problem = post("two.cbor").await.problem(400, "malformed-body");
-    assert!(problem["detail"].as_str().unwrap().contains("follow"), "{problem}");
+    assert!(problem["detail"].as_str().unwrap().contains("trailing"), "{problem}");
     server.stop().await;
 }
 

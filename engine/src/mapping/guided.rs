@@ -6,8 +6,8 @@ use super::anchors::AnchorSet;
 use super::coarse_graph::{Closure, CoarseGraph, deviation2, slack, with_floor};
 use super::config::MappingConfig;
 use super::memo::{RegistrationMemo, Request};
+use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
-use crate::pose_graph::PoseGraphError;
 use crate::registration::SearchWindow;
 
 /// A pair of anchors that the graph places near each other.
@@ -33,17 +33,18 @@ pub(crate) struct GuidedRound {
 /// Registers all neighbours of one graph that may be matched, and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
-/// Whatever the graph cannot solve.
+/// Whatever the graph cannot solve; [`MappingError::Stopped`].
 pub(crate) fn guided_closures(
     set: &AnchorSet,
     graph: &CoarseGraph,
     may_match: &impl Fn(usize, usize) -> bool,
     config: &MappingConfig,
     memo: &mut RegistrationMemo,
-) -> Result<GuidedRound, PoseGraphError> {
-    let neighbors = find_neighbors(set, graph, may_match, config)?;
+    span: Span<'_>,
+) -> Result<GuidedRound, MappingError> {
+    let neighbors = find_neighbors(set, graph, may_match, config, span.part(0, 2))?;
     let requests: Vec<Request> = neighbors.iter().map(|pair| pair.request).collect();
-    let fits = memo.answers(&requests, set, &config.submap);
+    let fits = memo.answers(&requests, set, &config.submap, span.part(1, 2))?;
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
@@ -76,11 +77,13 @@ fn find_neighbors(
     graph: &CoarseGraph,
     may_match: &impl Fn(usize, usize) -> bool,
     config: &MappingConfig,
-) -> Result<Vec<Neighbors>, PoseGraphError> {
+    span: Span<'_>,
+) -> Result<Vec<Neighbors>, MappingError> {
     let reach_m = config.neighbor_distance_m + config.max_search_m;
     let mut solver = graph.covariances()?;
     let mut found = Vec::new();
     for later in 0..set.anchors.len() {
+        span.done(later, set.anchors.len())?;
         let near: Vec<usize> = (0..later)
             .filter(|&earlier| {
                 may_match(earlier, later) && graph.poses[earlier].distance(&graph.poses[later]) < reach_m

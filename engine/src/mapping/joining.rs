@@ -15,6 +15,7 @@ use super::candidates::Candidate;
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::config::MappingConfig;
 use super::memo::{RegistrationMemo, Request};
+use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
 use crate::pose_graph::PoseGraphError;
 use crate::registration::SearchWindow;
@@ -47,12 +48,16 @@ impl Hypothesis {
 }
 
 /// Registers the candidates between different components.
+///
+/// # Errors
+/// [`MappingError::Stopped`].
 pub(crate) fn registered_candidates(
     candidates: &[Candidate],
     set: &AnchorSet,
     config: &MappingConfig,
     memo: &mut RegistrationMemo,
-) -> Vec<Option<Closure>> {
+    span: Span<'_>,
+) -> Result<Vec<Option<Closure>>, MappingError> {
     let requests: Vec<Request> = candidates
         .iter()
         .map(|candidate| Request {
@@ -61,15 +66,16 @@ pub(crate) fn registered_candidates(
             window: SearchWindow { center: candidate.predicted, half_m: 2.0, half_turn_rad: 0.35 },
         })
         .collect();
-    let fits = memo.answers(&requests, set, &config.submap);
-    requests
+    let fits = memo.answers(&requests, set, &config.submap, span)?;
+    let closures = requests
         .iter()
         .zip(fits)
         .map(|(request, fit)| {
             fit.filter(|fit| fit.agreement >= config.min_agreement && fit.overlap >= config.min_overlap)
                 .map(|fit| Closure { earlier: request.earlier, later: request.later, fit })
         })
-        .collect()
+        .collect();
+    Ok(closures)
 }
 
 /// The best few hypotheses between every two components that are wanted: sets of registrations that agree pair by

@@ -18,8 +18,8 @@ use super::refused::refused_matches;
 use super::run::RunRecord;
 use super::site_map::{MappedRun, SiteMap};
 use super::stretches::{StretchSettings, find_stretches};
+use super::watch::{MapStage, MappingError, Span, Watch};
 use crate::geometry::Pose2;
-use crate::pose_graph::PoseGraphError;
 use crate::registration::Opinions;
 
 /// Builds the map of a site.
@@ -31,7 +31,22 @@ pub fn map_site(
     runs: &[RunRecord<'_>],
     decisions: &[Decision],
     memo: &mut RegistrationMemo,
-) -> Result<SiteMap, PoseGraphError> {
+) -> Result<SiteMap, MappingError> {
+    map_site_watched(config, runs, decisions, memo, Watch::nobody())
+}
+
+/// Builds the map of a site while somebody watches how far it is, who may end it. What was registered until then is
+/// remembered.
+///
+/// # Errors
+/// Whatever the pose graph cannot solve; [`MappingError::Stopped`].
+pub fn map_site_watched(
+    config: &MappingConfig,
+    runs: &[RunRecord<'_>],
+    decisions: &[Decision],
+    memo: &mut RegistrationMemo,
+    watch: Watch<'_>,
+) -> Result<SiteMap, MappingError> {
     memo.prepare(&config.submap);
     let set = AnchorSet::build(runs, config);
     if set.anchors.is_empty() {
@@ -39,9 +54,9 @@ pub fn map_site(
     }
     let judgements = Judgements::new(decisions, runs, &set, config.submap_half_length_m);
     let mut mapper = Mapper::new(config, runs, &set, &judgements)?;
-    mapper.settle(memo)?;
+    mapper.settle(memo, watch.stage(MapStage::Settling))?;
     if runs.len() > 1 {
-        mapper.join(memo)?;
+        mapper.join(memo, watch.stage(MapStage::Joining))?;
     }
     Ok(mapper.finish())
 }
@@ -89,7 +104,7 @@ impl<'a> Mapper<'a> {
         runs: &'a [RunRecord<'a>],
         set: &'a AnchorSet,
         judgements: &'a Judgements<'a>,
-    ) -> Result<Self, PoseGraphError> {
+    ) -> Result<Self, MappingError> {
         let mut graph = CoarseGraph::new(set, runs, config);
         graph.optimize(set, &[], config)?;
         let components = (0..runs.len() as u32).collect();
@@ -98,15 +113,16 @@ impl<'a> Mapper<'a> {
     }
 
     /// Guided matching and optimisation in turns, until nothing new is found.
-    fn settle(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
-        for _ in 0..self.config.max_rounds {
+    fn settle(&mut self, memo: &mut RegistrationMemo, span: Span<'_>) -> Result<(), MappingError> {
+        for round in 0..self.config.max_rounds {
+            let span = span.part(round, self.config.max_rounds);
             let may_match = |earlier: usize, later: usize| {
                 self.draft.components[self.set.anchors[earlier].run_idx as usize]
                     == self.draft.components[self.set.anchors[later].run_idx as usize]
                     && self.set.may_match(earlier, later, self.config.min_gap_m)
                     && !self.judgements.forbid(earlier, later)
             };
-            let round = guided_closures(self.set, &self.draft.graph, &may_match, self.config, memo)?;
+            let round = guided_closures(self.set, &self.draft.graph, &may_match, self.config, memo, span)?;
             let kept = self.draft.graph.optimize(self.set, &round.closures, self.config)?;
             let (found, dropped) = sorted_out(round.closures, &kept);
             let refused = round.refused.into_iter().chain(dropped);
@@ -127,19 +143,23 @@ impl<'a> Mapper<'a> {
     }
 
     /// Lays components over each other, the surest first, as long as one convinces.
-    fn join(&mut self, memo: &mut RegistrationMemo) -> Result<(), PoseGraphError> {
+    fn join(&mut self, memo: &mut RegistrationMemo, span: Span<'_>) -> Result<(), MappingError> {
         let across: Vec<_> = candidates_across(self.runs, self.set, self.config)
             .into_iter()
             .filter(|candidate| !self.judgements.forbid(candidate.earlier, candidate.later))
             .collect();
-        let registered = registered_candidates(&across, self.set, self.config, memo);
+        let registered = registered_candidates(&across, self.set, self.config, memo, span.part(0, 3))?;
         self.unfit = refused_matches(&across, &registered);
         let registered: Vec<Closure> = registered.into_iter().flatten().collect();
         let mut refusals: BTreeMap<(u32, u32), RejectionReason> = BTreeMap::new();
         let mut proposals = self.proposals(&registered, &|_, _| true)?;
+        let mut num_proposals = proposals.len();
         while let Some(rivals) = proposals.pop() {
+            let num_left = proposals.len() + 1;
+            num_proposals = num_proposals.max(num_left);
+            let laying = span.part(1, 3).part(num_proposals - num_left, num_proposals);
             let (host, guest) = (rivals[0].host, rivals[0].guest);
-            if let Some(reason) = self.try_join(&rivals, memo)? {
+            if let Some(reason) = self.try_join(&rivals, memo, laying)? {
                 refusals.insert((host, guest), reason);
                 continue;
             }
@@ -151,7 +171,7 @@ impl<'a> Mapper<'a> {
             self.has_joined = true;
         }
         if self.has_joined {
-            self.settle(memo)?;
+            self.settle(memo, span.part(2, 3))?;
         }
         self.refuse_across(&registered, &refusals);
         Ok(())
@@ -162,7 +182,7 @@ impl<'a> Mapper<'a> {
         &self,
         registered: &[Closure],
         is_wanted: &dyn Fn(u32, u32) -> bool,
-    ) -> Result<Vec<Vec<Hypothesis>>, PoseGraphError> {
+    ) -> Result<Vec<Vec<Hypothesis>>, MappingError> {
         let Draft { graph, components, .. } = &self.draft;
         let mut found = hypotheses(registered, self.set, graph, components, is_wanted, self.config)?;
         found.sort_by_key(|rivals| rivals[0].rank());
@@ -189,11 +209,12 @@ impl<'a> Mapper<'a> {
         &mut self,
         rivals: &[Hypothesis],
         memo: &mut RegistrationMemo,
-    ) -> Result<Option<RejectionReason>, PoseGraphError> {
+        span: Span<'_>,
+    ) -> Result<Option<RejectionReason>, MappingError> {
         let before = self.draft.clone();
         let mut holding: Vec<(JoinReport, Draft)> = Vec::new();
-        for hypothesis in rivals {
-            let report = self.lay_over(hypothesis, memo)?;
+        for (idx, hypothesis) in rivals.iter().enumerate() {
+            let report = self.lay_over(hypothesis, memo, span.part(idx, rivals.len()))?;
             let draft = std::mem::replace(&mut self.draft, before.clone());
             if let Some(report) = report.filter(|report| report.holds(self.config)) {
                 holding.push((report, draft));
@@ -223,7 +244,8 @@ impl<'a> Mapper<'a> {
         &mut self,
         hypothesis: &Hypothesis,
         memo: &mut RegistrationMemo,
-    ) -> Result<Option<JoinReport>, PoseGraphError> {
+        span: Span<'_>,
+    ) -> Result<Option<JoinReport>, MappingError> {
         let of_component = |component: u32| -> Vec<usize> {
             (0..self.set.anchors.len())
                 .filter(|&anchor| {
@@ -259,7 +281,7 @@ impl<'a> Mapper<'a> {
                 break;
             }
             let may_match = |a: usize, b: usize| is_across(a, b) && !self.judgements.forbid(a, b);
-            let round = guided_closures(self.set, &self.draft.graph, &may_match, self.config, memo)?;
+            let round = guided_closures(self.set, &self.draft.graph, &may_match, self.config, memo, span)?;
             (across, self.draft.tried) = (round.closures, round.tried);
         }
         let guest_of = |a: usize, b: usize| if is_guest(a) { a } else { b };

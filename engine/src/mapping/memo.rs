@@ -1,10 +1,13 @@
 //! Remembers registrations, so that a rebuild only computes what is new.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::anchors::AnchorSet;
+use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
 use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
 
@@ -22,7 +25,7 @@ pub(crate) struct Request {
 type Key = (u64, u64, [i32; 5]);
 
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
     fits: HashMap<Key, Option<SubmapFit>>,
     config: Option<SubmapConfig>,
@@ -50,26 +53,33 @@ impl RegistrationMemo {
     /// Answers in the order of the requests; what is not remembered is computed in parallel.
     ///
     /// Windows are rounded first, so that a map that moved a little asks the same question again.
+    ///
+    /// # Errors
+    /// [`MappingError::Stopped`]; what was computed before is remembered.
     pub(crate) fn answers(
         &mut self,
         requests: &[Request],
         set: &AnchorSet,
         config: &SubmapConfig,
-    ) -> Vec<Option<SubmapFit>> {
+        span: Span<'_>,
+    ) -> Result<Vec<Option<SubmapFit>>, MappingError> {
         let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, set)).collect();
         let mut missing: Vec<(Key, Request)> =
             keyed.iter().filter(|(key, _)| !self.fits.contains_key(key)).copied().collect();
         missing.sort_by_key(|(key, _)| *key);
         missing.dedup_by_key(|(key, _)| *key);
+        let num_done = AtomicUsize::new(0);
         let computed: Vec<(Key, Option<SubmapFit>)> = missing
             .par_iter()
-            .map(|(key, request)| {
+            .filter_map(|(key, request)| {
+                span.done(num_done.fetch_add(1, Ordering::Relaxed), missing.len()).ok()?;
                 let (earlier, later) = (&set.submaps[request.earlier], &set.submaps[request.later]);
-                (*key, register(earlier, later, &request.window, config))
+                Some((*key, register(earlier, later, &request.window, config)))
             })
             .collect();
         self.fits.extend(computed);
-        keyed.iter().map(|(key, _)| self.fits.get(key).copied().flatten()).collect()
+        span.done(1, 1)?;
+        Ok(keyed.iter().map(|(key, _)| self.fits.get(key).copied().flatten()).collect())
     }
 }
 

@@ -16,6 +16,7 @@ mod ranges;
 pub(crate) mod resources;
 pub(crate) mod routes;
 pub(crate) mod values;
+mod whole;
 pub(crate) mod wording;
 
 use axum::http::{HeaderValue, header};
