@@ -181,9 +181,7 @@ impl RunRecord {
         let RunRecord1 { name, robot, geometry } = codec::decode_as(1, bytes, "a run")?;
         Ok(Self { name, robot, readings: ReadingRules::of(&geometry), geometry })
     }
-}
 
-impl RunRecord {
     /// What stands in the place of a run that was deleted: numbers of runs are never used again. No run has such a name.
     pub fn deleted() -> Self {
         let geometry = ScanGeometry {
@@ -193,7 +191,7 @@ impl RunRecord {
             range_max_m: 1.0,
             robot_from_laser: Pose2::identity(),
         };
-        Self { name: String::new(), robot: None, geometry }
+        Self { name: String::new(), robot: None, readings: ReadingRules::of(&geometry), geometry }
     }
 
     /// Whether the run was deleted.

@@ -90,8 +90,7 @@ impl App {
     pub async fn open_localization(
         &self,
         site: &Site,
-        geometry: ScanGeometry,
-        readings: ReadingRules,
+        (geometry, readings): (ScanGeometry, ReadingRules),
         prior: Option<PosePrior>,
         owner: Arc<str>,
         num_own_max: Option<usize>,

@@ -321,10 +321,10 @@ pub async fn open_localization(
     Extension(identity): Extension<Identity>,
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
-    let (geometry, readings) = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let laser = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
     let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
-    let info = state.app.open_localization(&site, geometry, readings, prior, owner, num_own_max).await?;
+    let info = state.app.open_localization(&site, laser, prior, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }
