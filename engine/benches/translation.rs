@@ -77,7 +77,7 @@ fn corridor_scans() -> Vec<Scan> {
         let at = index as f64 * 0.06;
         let pose = Pose2::new(at, 0.3 * (at * 0.7).sin(), 0.2 * (at * 0.7).cos());
         let ranges_m = (0..180).map(|beam| range_m(&pose, geometry.beam_angle_rad(beam), &walls)).collect();
-        Scan { timestamp_ns: index, odom_from_robot: pose, ranges_m }
+        Scan { timestamp_ns: index, odom_from_robot: pose, angular_velocity_rad_per_s: None, ranges_m }
     };
     (0..1000).map(scan).collect()
 }

@@ -63,8 +63,11 @@ impl ScanGeometry {
 pub struct Scan {
     /// As the robot's clock said, nanoseconds; stored and served, never used to sort.
     pub timestamp_ns: i64,
-    /// Raw odometry of the robot at the time of the scan.
+    /// Raw odometry of the robot at the time of the scan; of a robot without odometry always the same.
     pub odom_from_robot: Pose2,
-    /// Readings in metres, in the order of the geometry's beams.
+    /// How fast the robot turned then by a gyroscope of its own, counter-clockwise; none where it has none.
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// Readings in metres, in the order of the geometry's beams. Zero says nothing, as does a reading that is missing at
+    /// the end.
     pub ranges_m: Vec<f32>,
 }

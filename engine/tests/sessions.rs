@@ -31,7 +31,12 @@ fn sense(map: &GridMap, pose: &Pose2, odom_from_robot: Pose2) -> Scan {
         let angle = map_from_laser.theta + laser.beam_angle_rad(beam);
         cast_ray(map, &map_from_laser.position(), angle, 25.0) as f32
     };
-    Scan { timestamp_ns: 0, odom_from_robot, ranges_m: (0..laser.num_ranges).map(range).collect() }
+    Scan {
+        timestamp_ns: 0,
+        odom_from_robot,
+        angular_velocity_rad_per_s: None,
+        ranges_m: (0..laser.num_ranges).map(range).collect(),
+    }
 }
 
 /// Scans along a drive, odometry starting at zero.
@@ -185,6 +190,7 @@ fn a_map_of_nothing_and_scans_of_nothing_are_survived() {
     let blind = |step: i32| Scan {
         timestamp_ns: 0,
         odom_from_robot: Pose2::new(0.3 * f64::from(step), 0.0, 0.0),
+        angular_velocity_rad_per_s: None,
         ranges_m: vec![f32::NAN; laser().num_ranges],
     };
     let scans: Vec<Scan> = (0..30).map(blind).collect();

@@ -41,6 +41,7 @@ fn wavy_drive(num_scans: usize, seed: f64) -> Vec<Scan> {
         Scan {
             timestamp_ns: index as i64 * 100,
             odom_from_robot: pose,
+            angular_velocity_rad_per_s: None,
             ranges_m: (0..180).map(range).collect(),
         }
     };
@@ -143,7 +144,13 @@ fn no_input_makes_it_panic() {
         for ranges_m in [vec![], vec![f32::NAN; 180], vec![-1.0; 1000], vec![f32::MAX; 180], vec![1e-30; 180]]
         {
             let odom_from_robot = Pose2 { x: pose.0, y: pose.1, theta: pose.2 };
-            translator.push(&Scan { timestamp_ns: i64::MIN, odom_from_robot, ranges_m });
+            let rate = Some(f64::MAX * pose.1.signum());
+            translator.push(&Scan {
+                timestamp_ns: i64::MIN,
+                odom_from_robot,
+                angular_velocity_rad_per_s: rate,
+                ranges_m,
+            });
         }
     }
     translator.finish();

@@ -12,6 +12,7 @@ mod disk_full;
 mod documentation;
 mod headers;
 mod jobs;
+mod lasers;
 mod lists;
 mod maps;
 mod memory;

@@ -13,9 +13,11 @@ pub fn wire_pose(pose: &Pose2) -> wire::Pose {
 pub fn wire_geometry(geometry: &ScanGeometry) -> wire::Geometry {
     wire::Geometry {
         num_ranges: geometry.num_ranges,
+        num_ranges_min: None,
         angle_min_rad: geometry.angle_min_rad,
         angle_increment_rad: geometry.angle_increment_rad,
         range_max_m: geometry.range_max_m,
+        range_min_m: 0.0,
         robot_from_laser: wire_pose(&geometry.robot_from_laser),
     }
 }
@@ -25,7 +27,8 @@ pub fn wire_scan(geometry: &ScanGeometry, scan: &Scan) -> wire::Scan {
     let reading = |&range_m: &f32| if geometry.is_return(range_m) { range_m } else { f32::INFINITY };
     wire::Scan {
         timestamp_ns: scan.timestamp_ns,
-        odom_from_robot: wire_pose(&scan.odom_from_robot),
+        odom_from_robot: Some(wire_pose(&scan.odom_from_robot)),
+        angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         ranges_m: scan.ranges_m.iter().map(reading).collect(),
     }
 }

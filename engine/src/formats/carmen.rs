@@ -203,7 +203,7 @@ fn parse_flaser(fields: &mut Fields<'_>) -> Result<CarmenScan, FormatError> {
         beams: None,
         range_max_m: None,
         robot_from_laser: odom_from_robot.between(&odom_from_laser),
-        scan: Scan { timestamp_ns, odom_from_robot, ranges_m },
+        scan: Scan { timestamp_ns, odom_from_robot, angular_velocity_rad_per_s: None, ranges_m },
     })
 }
 
@@ -241,7 +241,7 @@ fn parse_robot_laser(fields: &mut Fields<'_>) -> Result<CarmenScan, FormatError>
         beams: Some(BeamAngles { min_rad: angle_min_rad, increment_rad: angle_increment_rad }),
         range_max_m: (range_max_m > 0.0).then_some(range_max_m),
         robot_from_laser: odom_from_robot.between(&odom_from_laser),
-        scan: Scan { timestamp_ns, odom_from_robot, ranges_m },
+        scan: Scan { timestamp_ns, odom_from_robot, angular_velocity_rad_per_s: None, ranges_m },
     })
 }
 

@@ -59,6 +59,7 @@ mod tests {
             .map(|idx| Scan {
                 timestamp_ns: 1_000_000 * idx,
                 odom_from_robot: Pose2::new(0.1 * idx as f64, 1.0, -0.5),
+                angular_velocity_rad_per_s: None,
                 ranges_m: vec![1.25, 30.0, 2.5],
             })
             .collect();

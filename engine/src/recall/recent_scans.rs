@@ -63,7 +63,12 @@ mod tests {
     use crate::geometry::Pose2;
 
     fn scan(x: f64, theta: f64) -> Scan {
-        Scan { timestamp_ns: 0, odom_from_robot: Pose2::new(x, 0.0, theta), ranges_m: vec![1.0] }
+        Scan {
+            timestamp_ns: 0,
+            odom_from_robot: Pose2::new(x, 0.0, theta),
+            angular_velocity_rad_per_s: None,
+            ranges_m: vec![1.0],
+        }
     }
 
     #[test]

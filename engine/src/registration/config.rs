@@ -151,14 +151,16 @@ impl Default for MotionLimits {
 }
 
 impl MotionLimits {
-    /// Covariance of (x, y, θ) of a robot that goes on as it did for some time, in its own axes.
-    pub fn covariance(&self, gap_s: f64) -> Matrix3<f64> {
+    /// Covariance of (x, y, θ) of a robot that goes on as it did for some time, in its own axes. A gyroscope that was
+    /// asked at both ends leaves a tenth of what the turning speed may change.
+    pub fn covariance(&self, gap_s: f64, has_gyroscope: bool) -> Matrix3<f64> {
         let within =
             |acceleration: f64, speed_max: f64| (acceleration * gap_s * gap_s).min(speed_max * gap_s);
         let ahead_sd = self.floor_m + within(self.acceleration_m_per_s2, self.speed_max_m_per_s);
         let aside_sd = self.floor_m + 0.3 * within(self.acceleration_m_per_s2, self.speed_max_m_per_s);
-        let turn_sd =
-            self.floor_rad + within(self.turn_acceleration_rad_per_s2, self.turn_speed_max_rad_per_s);
+        let share = if has_gyroscope { 0.1 } else { 1.0 };
+        let turn_sd = share
+            * (self.floor_rad + within(self.turn_acceleration_rad_per_s2, self.turn_speed_max_rad_per_s));
         Matrix3::from_diagonal(&nalgebra::Vector3::new(
             ahead_sd * ahead_sd,
             aside_sd * aside_sd,

@@ -56,6 +56,8 @@ struct Latest {
     start_from_robot: Pose2,
     /// Motion from the scan before that one.
     motion: Pose2,
+    /// By the gyroscope of a robot that has one.
+    angular_velocity_rad_per_s: Option<f64>,
 }
 
 /// What is kept of a refiner between processes; the surface map follows from the scans.
@@ -209,6 +211,7 @@ impl OdometryRefiner {
             odom_from_robot: scan.odom_from_robot,
             start_from_robot: Pose2::identity(),
             motion: Pose2::identity(),
+            angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         });
         (Pose2::identity(), Some(KeyframeMotion { motion_covariance: [[0.0; 3]; 3] }))
     }
@@ -236,8 +239,10 @@ impl OdometryRefiner {
         let step = latest.odom_from_robot.between(&scan.odom_from_robot);
         let is_possible = config.motion.is_possible(&step, gap_s, interval_s);
         let share = if interval_s > 0.0 { (gap_s / interval_s).min(10.0) } else { 1.0 };
-        let onward =
+        let mut onward =
             Pose2::new(latest.motion.x * share, latest.motion.y * share, latest.motion.theta * share);
+        let gyroscope = turn_by_gyroscope(latest, scan, gap_s);
+        onward.theta = gyroscope.unwrap_or(onward.theta);
         // A step that cannot be is offered once, and never carried on.
         let carried = if is_possible { step } else { onward };
         let (fixed, keyframe) = (self.state.fixed.as_mut()?, self.state.keyframe.as_mut()?);
@@ -251,8 +256,8 @@ impl OdometryRefiner {
             fixed.covariance + rotated(&config.odometry.covariance(&motion), fixed.start_from_robot.theta);
         let odometry = Witness::new(by_odometry, &covariance, belief);
         let going_on = latest.start_from_robot.compose(&onward);
-        let covariance =
-            fixed.covariance + rotated(&config.motion.covariance(gap_s), latest.start_from_robot.theta);
+        let covariance = fixed.covariance
+            + rotated(&config.motion.covariance(gap_s, gyroscope.is_some()), latest.start_from_robot.theta);
         let onward = Witness::new(going_on, &covariance, (1.0 - belief).max(config.lie_probability));
         let is_by_odometry = odometry.is_some() && belief > 0.5;
         let predicted = if is_by_odometry { by_odometry } else { going_on };
@@ -409,6 +414,7 @@ impl OdometryRefiner {
             odom_from_robot: scan.odom_from_robot,
             start_from_robot,
             motion,
+            angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         });
     }
 
@@ -431,6 +437,14 @@ impl OdometryRefiner {
         }
         self.fitted.clear();
     }
+}
+
+/// How far the robot turned since the scan before by the rates that its gyroscope told at both.
+fn turn_by_gyroscope(latest: &Latest, scan: &Scan, gap_s: f64) -> Option<f64> {
+    let (before, now) = (latest.angular_velocity_rad_per_s?, scan.angular_velocity_rad_per_s?);
+    let turn = 0.5 * (before + now) * gap_s;
+    // Beyond a turn something else than the robot is told of.
+    (turn.abs() < std::f64::consts::TAU).then_some(turn)
 }
 
 fn alignment_settings(config: &RefinerConfig) -> AlignmentSettings {

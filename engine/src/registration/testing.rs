@@ -42,7 +42,7 @@ pub fn sense(
             nearest.fold(geometry.range_max_m, f64::min) as f32
         })
         .collect();
-    Scan { timestamp_ns: 0, odom_from_robot: *odom_from_robot, ranges_m }
+    Scan { timestamp_ns: 0, odom_from_robot: *odom_from_robot, angular_velocity_rad_per_s: None, ranges_m }
 }
 
 fn hit(wall: &Wall, from: &Point2, angle_rad: f64) -> Option<f64> {

@@ -9,7 +9,7 @@ use super::runs::{NewBatch, NewRun};
 use super::site::Site;
 use super::{App, AppError, Name};
 use crate::config::ServerConfig;
-use crate::records::{JobKind, JobState};
+use crate::records::{JobKind, JobState, ReadingRules};
 use crate::storage::faulty::{Fault, FaultyStorage};
 use crate::storage::{MemoryStorage, Storage};
 
@@ -40,6 +40,7 @@ fn scans() -> Vec<Scan> {
         Scan {
             timestamp_ns: idx as i64 * 100_000_000,
             odom_from_robot: Pose2::new(x, 0.0, 0.0),
+            angular_velocity_rad_per_s: None,
             ranges_m: (0..NUM_RANGES).map(range).collect(),
         }
     };
@@ -74,14 +75,15 @@ async fn work(storage: Arc<dyn Storage>) -> String {
     config.storage.num_scans_per_checkpoint = 100;
     let app = Arc::new(App::new(config, storage));
     let (site_name, run_name) = (Name::new("s", "site").unwrap(), Name::new("r", "run").unwrap());
-    let new = NewRun { robot: None, geometry: geometry() };
+    let geometry = geometry();
+    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
     insist("site", async || app.make_site(&site_name, None).await.map(|_| ())).await;
     let site = insist("open", async || app.site(&site_name).await).await;
     insist("run", async || app.make_run(&site, &run_name, new.clone()).await.map(|_| ())).await;
     for (idx, scans) in scans().chunks(NUM_SCANS_PER_BATCH).enumerate() {
         let first_sequence = (idx * NUM_SCANS_PER_BATCH) as u64;
         let receipt = insist("batch", async || {
-            let batch = NewBatch { first_sequence, scans: scans.to_vec() };
+            let batch = NewBatch { first_sequence, scans: scans.to_vec(), has_odometry: true };
             app.append_batch(Arc::clone(&site), &run_name, batch).await
         })
         .await;

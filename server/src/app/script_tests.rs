@@ -21,7 +21,7 @@ use super::runs::{Frame, NewBatch, NewRun, trajectory};
 use super::site::Site;
 use super::{App, AppError, Name};
 use crate::config::ServerConfig;
-use crate::records::{JobKind, Run};
+use crate::records::{JobKind, ReadingRules, Run};
 use crate::storage::{MemoryStorage, SledConfig, SledStorage, Storage};
 
 /// A drawn building: `#` is a square metre of wall, the last line lies at y = 0.
@@ -147,6 +147,7 @@ impl Stage {
         let scan = |(idx, pose): (usize, &Pose2)| Scan {
             timestamp_ns: idx as i64 * 100_000_000,
             odom_from_robot: poses[0].between(pose),
+            angular_velocity_rad_per_s: None,
             ranges_m: (0..geometry.num_ranges)
                 .map(|beam| self.building.range_m(pose, geometry.beam_angle_rad(beam), geometry.range_max_m))
                 .collect(),
@@ -179,7 +180,8 @@ impl Stage {
     }
 
     async fn make_run(&self, run: &str) -> Result<String, AppError> {
-        let new = NewRun { robot: None, geometry: geometry() };
+        let geometry = geometry();
+        let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
         let (run, is_new) = self.app.make_run(&*self.site().await?, &name(run), new).await?;
         Ok(format!("{}, run {}\n", if is_new { "made" } else { "was there" }, run.idx))
     }
@@ -191,7 +193,8 @@ impl Stage {
         let (from, to) = range.split_once("..").expect("a range from..to");
         let (from, to): (usize, usize) = (from.parse().unwrap(), to.parse().unwrap());
         let first_sequence = claimed.map_or(from as u64, |first| first.parse().unwrap());
-        let batch = NewBatch { first_sequence, scans: self.drives[drive][from..to].to_vec() };
+        let batch =
+            NewBatch { first_sequence, scans: self.drives[drive][from..to].to_vec(), has_odometry: true };
         let receipt = self.app.append_batch(self.site().await?, &name(run), batch).await?;
         Ok(format!(
             "next {}, {} observations, {} words\n",

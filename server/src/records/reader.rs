@@ -9,6 +9,7 @@ use super::codec;
 use super::keys::{Generation, Key, MapVersion, RunIdx};
 use super::map::Map;
 use super::run::Run;
+use super::stored::RunRecord;
 use super::stored_map::MapRecord;
 use crate::storage::{Reader, StorageError};
 
@@ -47,7 +48,7 @@ impl SiteReader {
         let keys = [Key::Run(idx), Key::RunHead(idx), Key::TextHead(self.generation, idx)];
         let values = self.store.multi_get(&keys.map(|key| key.encode())).await?;
         let missing = || StorageError::Corrupt { what: format!("run {idx} is missing") };
-        let record = codec::decode(values[0].as_ref().ok_or_else(missing)?, "a run")?;
+        let record = RunRecord::decode(values[0].as_ref().ok_or_else(missing)?)?;
         let head = codec::decode(values[1].as_ref().ok_or_else(missing)?, "the head of a run")?;
         let text = values[2].as_ref().map(|bytes| codec::decode(bytes, "the head of a text")).transpose()?;
         Ok(Run { idx, record: Arc::new(record), head, text: text.unwrap_or_default(), reader: self.clone() })

@@ -3,7 +3,6 @@
 use locution_engine::geometry::Pose2;
 use locution_engine::scan::{Scan, ScanGeometry};
 
-use super::codec;
 use super::keys::{Key, RunIdx};
 use super::packed_ranges::{pack_ranges, unpack_ranges};
 use super::series::{self, NUM_ITEMS_PER_CHUNK_MAX};
@@ -15,20 +14,20 @@ const CHUNK_BYTES_MAX: usize = 256 << 10;
 
 /// Writes a batch of scans into a storage batch; the last chunk carries the receipt.
 pub fn append_scans(batch: &mut Batch, run: RunIdx, first_sequence: u64, scans: &[Scan], receipt: Receipt) {
-    let mut chunk = ScanChunk { stamps: Vec::new(), packed_ranges: Vec::new(), receipt: None };
+    let mut chunk = ScanChunk::default();
     let mut chunk_first = first_sequence;
     for scan in scans {
         if chunk.stamps.len() == NUM_ITEMS_PER_CHUNK_MAX || chunk.packed_ranges.len() > CHUNK_BYTES_MAX {
-            batch.put(Key::Scans(run, chunk_first).encode(), codec::encode(&chunk));
+            batch.put(Key::Scans(run, chunk_first).encode(), chunk.encode());
             chunk_first += chunk.stamps.len() as u64;
-            chunk.stamps.clear();
-            chunk.packed_ranges.clear();
+            chunk = ScanChunk::default();
         }
         chunk.stamps.push((scan.timestamp_ns, scan.odom_from_robot));
+        chunk.angular_velocities_rad_per_s.push(scan.angular_velocity_rad_per_s);
         pack_ranges(&scan.ranges_m, &mut chunk.packed_ranges);
     }
     chunk.receipt = Some((first_sequence, receipt));
-    batch.put(Key::Scans(run, chunk_first).encode(), codec::encode(&chunk));
+    batch.put(Key::Scans(run, chunk_first).encode(), chunk.encode());
 }
 
 /// Reads the scans of a range of sequence numbers.
@@ -97,7 +96,7 @@ async fn visit_chunks(
 ) -> Result<(), StorageError> {
     let key = |first| Key::Scans(run, first);
     series::for_each_chunk(reader, &Key::all_scans(run), key, range, |first, bytes| {
-        let chunk: ScanChunk = codec::decode(bytes, "a chunk of scans")?;
+        let chunk = ScanChunk::decode(bytes)?;
         let num_scans = chunk.stamps.len() as u64;
         visit(first, chunk)?;
         Ok(num_scans)
@@ -108,17 +107,19 @@ async fn visit_chunks(
 fn unpack(chunk: ScanChunk, num_ranges: usize) -> Result<Vec<Scan>, StorageError> {
     let mut packed = chunk.packed_ranges.as_slice();
     let corrupt = || StorageError::Corrupt { what: "the readings of a scan".into() };
-    let unpack_one = |(timestamp_ns, odom_from_robot)| {
+    let velocities = chunk.angular_velocities_rad_per_s.into_iter().chain(std::iter::repeat(None));
+    let unpack_one = |((timestamp_ns, odom_from_robot), angular_velocity_rad_per_s)| {
         let ranges_m = unpack_ranges(&mut packed, num_ranges).ok_or_else(corrupt)?;
-        Ok(Scan { timestamp_ns, odom_from_robot, ranges_m })
+        Ok(Scan { timestamp_ns, odom_from_robot, angular_velocity_rad_per_s, ranges_m })
     };
-    chunk.stamps.into_iter().map(unpack_one).collect()
+    chunk.stamps.into_iter().zip(velocities).map(unpack_one).collect()
 }
 
 /// Whether two scans are the same recording; readings without a return are equal to one another.
 pub fn is_same_scan(a: &Scan, b: &Scan) -> bool {
     a.timestamp_ns == b.timestamp_ns
         && a.odom_from_robot == b.odom_from_robot
+        && a.angular_velocity_rad_per_s == b.angular_velocity_rad_per_s
         && a.ranges_m.len() == b.ranges_m.len()
         && a.ranges_m.iter().zip(&b.ranges_m).all(|(a, b)| a == b || (a.is_nan() && b.is_nan()))
 }

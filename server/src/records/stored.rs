@@ -126,6 +126,9 @@ impl SiteRecord {
     }
 }
 
+/// The layout of [`RunRecord`]; 1 said nothing of the readings.
+const RUN_LAYOUT: u8 = 2;
+
 /// `Key::Run`: what a run is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RunRecord {
@@ -134,9 +137,51 @@ pub struct RunRecord {
     /// The robot, when the client said.
     pub robot: Option<String>,
     pub geometry: ScanGeometry,
+    pub readings: ReadingRules,
+}
+
+/// What the client said of the readings that the laser sends.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReadingRules {
+    /// What is nearer is no reading, metres.
+    pub range_min_m: f64,
+    /// Fewest readings of a scan; those missing at the end say nothing.
+    pub num_ranges_min: usize,
+}
+
+impl ReadingRules {
+    /// All readings of this laser are there and to be believed.
+    pub const fn of(geometry: &ScanGeometry) -> Self {
+        Self { range_min_m: 0.0, num_ranges_min: geometry.num_ranges }
+    }
+}
+
+/// [`RunRecord`] as runs stored it before.
+#[derive(Serialize, Deserialize)]
+struct RunRecord1 {
+    name: String,
+    robot: Option<String>,
+    geometry: ScanGeometry,
 }
 
 impl RunRecord {
+    /// The stored form.
+    pub fn encode(&self) -> Bytes {
+        codec::encode_as(RUN_LAYOUT, self)
+    }
+
+    /// The record behind its stored form, of either layout.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, StorageError> {
+        if codec::version_of(bytes) != Some(1) {
+            return codec::decode_as(RUN_LAYOUT, bytes, "a run");
+        }
+        let RunRecord1 { name, robot, geometry } = codec::decode_as(1, bytes, "a run")?;
+        Ok(Self { name, robot, readings: ReadingRules::of(&geometry), geometry })
+    }
+
     /// What stands in the place of a run that was deleted: numbers of runs are never used again. No run has such a name.
     pub fn deleted() -> Self {
         let geometry = ScanGeometry {
@@ -146,7 +191,7 @@ impl RunRecord {
             range_max_m: 1.0,
             robot_from_laser: Pose2::identity(),
         };
-        Self { name: String::new(), robot: None, geometry }
+        Self { name: String::new(), robot: None, readings: ReadingRules::of(&geometry), geometry }
     }
 
     /// Whether the run was deleted.
@@ -190,8 +235,12 @@ impl TextHead {
     }
 }
 
+/// The layout of [`ScanChunk`] when some scan tells an angular velocity; those without are written as layout 1, which
+/// ends before it.
+const TURNING_SCANS_LAYOUT: u8 = 2;
+
 /// `Key::Scans`: consecutive scans.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ScanChunk {
     /// Timestamp and odometry of each scan.
     pub stamps: Vec<(i64, Pose2)>,
@@ -199,6 +248,33 @@ pub struct ScanChunk {
     pub packed_ranges: Vec<u8>,
     /// Set on the last chunk of a batch: the first sequence number of that batch and what it was answered.
     pub receipt: Option<(u64, Receipt)>,
+    /// How fast the robot turned at each scan by its own gyroscope; empty when no scan tells.
+    #[serde(skip)]
+    pub angular_velocities_rad_per_s: Vec<Option<f64>>,
+}
+
+impl ScanChunk {
+    /// The stored form.
+    pub fn encode(&self) -> Bytes {
+        let velocities = &self.angular_velocities_rad_per_s;
+        if velocities.iter().all(Option::is_none) {
+            return codec::encode(self);
+        }
+        codec::encode_as(TURNING_SCANS_LAYOUT, &(self, velocities))
+    }
+
+    /// The chunk behind its stored form, of either layout.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, StorageError> {
+        let what = "a chunk of scans";
+        if codec::version_of(bytes) != Some(TURNING_SCANS_LAYOUT) {
+            return codec::decode(bytes, what);
+        }
+        let (chunk, angular_velocities_rad_per_s) = codec::decode_as(TURNING_SCANS_LAYOUT, bytes, what)?;
+        Ok(Self { angular_velocities_rad_per_s, ..chunk })
+    }
 }
 
 /// What an accepted batch is answered, then and whenever it is repeated.
@@ -262,6 +338,30 @@ pub struct JobRecord {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_run_of_the_first_layout_is_read_and_believes_all_its_readings() {
+        let geometry = ScanGeometry {
+            num_ranges: 3,
+            angle_min_rad: -1.0,
+            angle_increment_rad: 1.0,
+            range_max_m: 10.0,
+            robot_from_laser: Pose2::identity(),
+        };
+        let old = RunRecord1 { name: "r".into(), robot: Some("porter".into()), geometry };
+        let record = RunRecord::decode(&codec::encode(&old)).unwrap();
+        assert_eq!(record.readings, ReadingRules { range_min_m: 0.0, num_ranges_min: 3 });
+        assert_eq!(RunRecord::decode(&record.encode()).unwrap(), record);
+    }
+
+    #[test]
+    fn chunks_keep_angular_velocities_and_those_without_keep_their_layout() {
+        let chunk = ScanChunk { stamps: vec![(1, Pose2::identity()); 2], ..ScanChunk::default() };
+        assert_eq!(codec::version_of(&chunk.encode()), Some(1));
+        assert_eq!(ScanChunk::decode(&chunk.encode()).unwrap(), chunk);
+        let turning = ScanChunk { angular_velocities_rad_per_s: vec![Some(0.25), None], ..chunk };
+        assert_eq!(ScanChunk::decode(&turning.encode()).unwrap(), turning);
+    }
 
     #[test]
     fn a_site_of_the_first_layout_is_read_and_given_a_birth() {

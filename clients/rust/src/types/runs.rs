@@ -9,12 +9,18 @@ use super::values::Pose;
 pub struct Geometry {
     /// Readings per scan, at most the server's limit.
     pub num_ranges: usize,
+    /// Fewest readings of a scan, of a laser whose number varies; those missing at the end say nothing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub num_ranges_min: Option<usize>,
     /// Direction of the first beam in the laser's frame.
     pub angle_min_rad: f64,
     /// From one beam to the next; negative when the sweep runs clockwise.
     pub angle_increment_rad: f64,
     /// A reading at or above this means "no return".
     pub range_max_m: f64,
+    /// A reading below this means "too near to tell" and says nothing.
+    #[serde(default)]
+    pub range_min_m: f64,
     /// Where the laser sits on the robot; at its centre looking ahead unless said.
     #[serde(default)]
     pub robot_from_laser: Pose,
@@ -69,9 +75,12 @@ pub struct StoredScan {
     pub scan_seq: u64,
     /// As sent.
     pub timestamp_ns: i64,
-    /// As sent.
+    /// As sent; all zero for a robot without odometry.
     pub odom_from_robot: Pose,
-    /// As sent; readings without a return are null.
+    /// As sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// As sent; readings without a return are null, those too near or missing at the end are 0.
     #[serde(with = "ranges")]
     pub ranges_m: Vec<f32>,
 }
@@ -81,9 +90,13 @@ pub struct StoredScan {
 pub struct Scan {
     /// As the robot's clock said, nanoseconds.
     pub timestamp_ns: i64,
-    /// Raw odometry of the robot.
-    pub odom_from_robot: Pose,
-    /// Readings in metres; what is not finite is "no return".
+    /// Raw odometry of the robot; a robot without odometry has none in all scans of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odom_from_robot: Option<Pose>,
+    /// How fast the robot turned then by a gyroscope, counter-clockwise.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// Readings in metres; minus infinity is "too near"; what is not finite is "no return".
     #[serde(with = "ranges")]
     pub ranges_m: Vec<f32>,
 }
@@ -97,7 +110,7 @@ pub struct NewRun {
     pub geometry: Geometry,
 }
 
-/// JSON has neither NaN nor infinity: "no return" is `null` there, and infinity here.
+/// JSON has neither NaN nor infinity: "no return" is `null` there, and infinity here; "too near" is 0 there.
 mod ranges {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
@@ -105,7 +118,12 @@ mod ranges {
         if !serializer.is_human_readable() {
             return ranges_m.serialize(serializer);
         }
-        serializer.collect_seq(ranges_m.iter().map(|&range_m| range_m.is_finite().then_some(range_m)))
+        let reading = |&range_m: &f32| match range_m {
+            // Zero says nothing, as does a reading that was too near.
+            f32::NEG_INFINITY => Some(0.0),
+            range_m => range_m.is_finite().then_some(range_m),
+        };
+        serializer.collect_seq(ranges_m.iter().map(reading))
     }
 
     pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f32>, D::Error> {
@@ -121,14 +139,15 @@ mod tests {
     #[test]
     fn no_return_is_null_in_json_and_infinite_in_cbor() {
         let ranges_m = vec![1.25, f32::INFINITY, 81.83];
-        let scan = Scan { timestamp_ns: 5, odom_from_robot: Pose::default(), ranges_m };
+        let scan =
+            Scan { timestamp_ns: 5, odom_from_robot: None, angular_velocity_rad_per_s: None, ranges_m };
         let json = serde_json::to_string(&scan).unwrap();
         assert!(json.ends_with(r#""ranges_m":[1.25,null,81.83]}"#), "{json}");
         assert_eq!(serde_json::from_str::<Scan>(&json).unwrap(), scan);
         let mut bytes = Vec::new();
         ciborium::into_writer(&scan, &mut bytes).unwrap();
         let value: ciborium::Value = ciborium::from_reader(bytes.as_slice()).unwrap();
-        let ranges = value.as_map().unwrap()[2].1.as_array().unwrap();
+        let ranges = value.as_map().unwrap()[1].1.as_array().unwrap();
         assert_eq!(ranges[1].as_float(), Some(f64::INFINITY));
     }
 }

@@ -17,7 +17,7 @@ use lru::LruCache;
 use crate::app::runs::NewBatch;
 use crate::app::site::Site;
 use crate::app::{App, AppError, forget_where, on_blocking_thread};
-use crate::records::{Map, MapRun};
+use crate::records::{Map, MapRun, ReadingRules};
 
 /// Memory for prepared maps of all sites; the one asked about last is kept whatever it takes.
 const NUM_BYTES_KEPT_MAX: usize = 512 << 20;
@@ -90,10 +90,11 @@ impl App {
     pub async fn find_example(
         &self,
         sites: &[Arc<Site>],
-        geometry: &ScanGeometry,
+        (geometry, readings): (&ScanGeometry, &ReadingRules),
         batch: NewBatch,
     ) -> Result<Vec<ExampleInfo>, AppError> {
-        let scans = Arc::new(batch.checked(geometry, 0, None, self.config().limits.odometry_step_max_m)?);
+        let step_max_m = self.config().limits.odometry_step_max_m;
+        let scans = Arc::new(batch.checked((geometry, readings), 0, None, step_max_m)?);
         let (mut answers, mut found_by_site) = (Vec::new(), Vec::new());
         let mut config = RecallConfig::default();
         for site in sites {

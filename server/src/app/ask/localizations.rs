@@ -18,7 +18,7 @@ use super::examples::invalid_geometry;
 use crate::app::runs::NewBatch;
 use crate::app::site::{Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::Map;
+use crate::records::{Map, ReadingRules};
 
 /// Components that a session looks at, the largest first.
 const NUM_COMPONENTS_MAX: usize = 4;
@@ -57,6 +57,7 @@ struct Session {
     site: u64,
     owner: Arc<str>,
     geometry: ScanGeometry,
+    readings: ReadingRules,
     map_version: u64,
     latest_use: Mutex<Instant>,
     /// The state that those who watch were told.
@@ -89,7 +90,7 @@ impl App {
     pub async fn open_localization(
         &self,
         site: &Site,
-        geometry: ScanGeometry,
+        (geometry, readings): (ScanGeometry, ReadingRules),
         prior: Option<PosePrior>,
         owner: Arc<str>,
         num_own_max: Option<usize>,
@@ -101,6 +102,7 @@ impl App {
             site: site.birth(),
             owner,
             geometry,
+            readings,
             map_version: map.record.version,
             latest_use: Mutex::new(Instant::now()),
             told: Mutex::new(None),
@@ -156,7 +158,12 @@ impl App {
         }
         let num_known = (expected_sequence - batch.first_sequence) as usize;
         let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = batch.checked(&session.geometry, num_known, search.latest_odom, step_max_m)?;
+        let scans = batch.checked(
+            (&session.geometry, &session.readings),
+            num_known,
+            search.latest_odom,
+            step_max_m,
+        )?;
         let mut feeding = search.clone();
         *search = on_blocking_thread(move || {
             feeding.push(&scans);

@@ -84,7 +84,7 @@ async fn make_unknown(site: &Site, run: RunIdx, name: &Name) -> Result<(), AppEr
     site.change(|record, batch| {
         record.num_deleted_runs += 1;
         batch.delete(Key::RunName(name.to_string()).encode());
-        batch.put(Key::Run(run).encode(), codec::encode(&RunRecord::deleted()));
+        batch.put(Key::Run(run).encode(), RunRecord::deleted().encode());
         let head = RunHead { is_finished: true, ..RunHead::default() };
         batch.put(Key::RunHead(run).encode(), codec::encode(&head));
         batch.delete(Key::TextHead(record.generation, run).encode());

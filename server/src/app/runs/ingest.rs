@@ -14,9 +14,11 @@ use std::time::Instant;
 use locution_engine::geometry::Pose2;
 use locution_engine::scan::{Scan, ScanGeometry};
 
-use crate::app::site::{RunChange, RunWriter, Site, SiteEvent, WriterState};
+use crate::app::site::{RunChange, RunWriter, Site, SiteEvent, Translated, WriterState};
 use crate::app::{App, AppError, Name, on_blocking_thread};
-use crate::records::{Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans};
+use crate::records::{
+    ReadingRules, Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans,
+};
 use crate::storage::Batch;
 
 /// Scans to append to a run.
@@ -26,18 +28,20 @@ pub struct NewBatch {
     pub first_sequence: u64,
     /// In order; readings without a return are NaN or infinite.
     pub scans: Vec<Scan>,
+    /// False when no scan tells where the robot is by its odometry.
+    pub has_odometry: bool,
 }
 
 impl NewBatch {
     /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
     pub fn checked(
         mut self,
-        geometry: &ScanGeometry,
+        (geometry, readings): (&ScanGeometry, &ReadingRules),
         num_known: usize,
         before: Option<Pose2>,
         step_max_m: f64,
     ) -> Result<Vec<Scan>, AppError> {
-        check_readings(&mut self.scans, geometry)?;
+        check_readings(&mut self.scans, geometry, readings)?;
         let num_known = num_known.min(self.scans.len());
         check_odometry(&self.scans, num_known, before, step_max_m)?;
         Ok(self.scans.split_off(num_known))
@@ -125,8 +129,7 @@ impl App {
                 format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
             return Err(AppError::invalid("scans", problem));
         }
-        let geometry = &writer.record.geometry;
-        check_readings(&mut batch.scans, geometry)?;
+        check_readings(&mut batch.scans, &writer.record.geometry, &writer.record.readings)?;
         let num_repeated = repeated_scans(site, writer, &state.head.value, &batch).await?;
         if num_repeated == batch.scans.len() {
             return receipt_again(site, writer, state, &batch).await;
@@ -135,6 +138,7 @@ impl App {
             let expected_sequence = state.head.value.next_sequence;
             return Err(AppError::Finished { run: writer.record.name.clone(), expected_sequence });
         }
+        check_has_odometry(&batch, state.head.value.last_odom_from_robot)?;
         let step_max_m = self.config().limits.odometry_step_max_m;
         check_odometry(&batch.scans, num_repeated, state.head.value.last_odom_from_robot, step_max_m)?;
         let fresh = batch.scans.split_off(num_repeated);
@@ -149,26 +153,62 @@ impl App {
 fn leaves_state_whole(outcome: &Result<Receipt, AppError>) -> bool {
     matches!(
         outcome,
-        Ok(_) | Err(AppError::Sequence { .. } | AppError::Finished { .. } | AppError::Invalid { .. })
+        Ok(_)
+            | Err(AppError::Sequence { .. }
+                | AppError::Finished { .. }
+                | AppError::Invalid { .. }
+                | AppError::NotReady { .. })
     )
 }
 
-/// Checks each reading and makes every way of saying "no return" NaN.
-fn check_readings(scans: &mut [Scan], geometry: &ScanGeometry) -> Result<(), AppError> {
+/// Checks the readings, and writes them in the one way that is stored: NaN for "no return", zero for what says nothing,
+/// which is too near or missing at the end.
+fn check_readings(scans: &mut [Scan], geometry: &ScanGeometry, rules: &ReadingRules) -> Result<(), AppError> {
+    let (num_min, num_max) = (rules.num_ranges_min, geometry.num_ranges);
     for (scan_idx, scan) in scans.iter_mut().enumerate() {
+        let refuse =
+            |problem: String| Err(AppError::invalid_scan(format!("scans[{scan_idx}].ranges_m"), problem));
         let num_ranges = scan.ranges_m.len();
-        if num_ranges != geometry.num_ranges {
-            let problem = format!(
-                "scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}",
-                geometry.num_ranges
-            );
-            return Err(AppError::invalid_scan(format!("scans[{scan_idx}].ranges_m"), problem));
+        if num_ranges < num_min || num_ranges > num_max {
+            let stated =
+                if num_min == num_max { num_max.to_string() } else { format!("{num_min} to {num_max}") };
+            return refuse(format!(
+                "scan {scan_idx} has {num_ranges} ranges, the run's geometry has {stated}"
+            ));
+        }
+        if are_millimeters(&scan.ranges_m) {
+            let problem = format!("most ranges of scan {scan_idx} are beyond {PLAUSIBLE_RANGE_M} m");
+            return refuse(format!("{problem}: they must be metres, not millimetres"));
         }
         for range_m in &mut scan.ranges_m {
-            if !range_m.is_finite() || f64::from(*range_m) >= geometry.range_max_m {
+            let told = f64::from(*range_m);
+            if told < rules.range_min_m {
+                *range_m = 0.0;
+            } else if !told.is_finite() || told >= geometry.range_max_m {
                 *range_m = f32::NAN;
             }
         }
+        scan.ranges_m.resize(num_max, 0.0);
+    }
+    Ok(())
+}
+
+/// Hardly any laser sees farther, metres.
+const PLAUSIBLE_RANGE_M: f32 = 200.0;
+
+/// True when most readings are too far for metres and differ from one another, as codes for "no return" do not.
+fn are_millimeters(ranges_m: &[f32]) -> bool {
+    let num_finite = ranges_m.iter().filter(|range_m| range_m.is_finite() && **range_m > 0.0).count();
+    let is_far = |range_m: f32| range_m.is_finite() && range_m > PLAUSIBLE_RANGE_M;
+    let num_differing = ranges_m.windows(2).filter(|pair| is_far(pair[1]) && pair[0] != pair[1]).count();
+    num_finite >= 8 && 2 * num_differing > num_finite
+}
+
+/// A run has odometry from its first scan on or never.
+fn check_has_odometry(batch: &NewBatch, before: Option<Pose2>) -> Result<(), AppError> {
+    if !batch.has_odometry && before.is_some_and(|before| before != Pose2::identity()) {
+        let problem = "the scans of this run had odometry so far; all scans of a run have it or none";
+        return Err(AppError::invalid_scan("scans[0].odom_from_robot", problem));
     }
     Ok(())
 }
@@ -279,10 +319,13 @@ async fn append_fresh(
     Ok(receipt)
 }
 
-/// Stores the tail of a text. A finished run needs no translator again, so the stored one goes.
+/// Stores the tail of a text. A finished run needs no translator again, so the stored one goes. A run that an earlier
+/// version of the server left open ends where its text does.
 async fn finish(site: &Site, writer: &RunWriter, state: &mut WriterState) -> Result<(), AppError> {
-    let translator = state.take_translator()?;
-    let translated = on_blocking_thread(move || translator.finish()).await?;
+    let translated = match state.translator.take() {
+        Some(translator) => on_blocking_thread(move || translator.finish()).await?,
+        None => Translated::default(),
+    };
     let mut batch = Batch::default();
     state.append_text(writer.idx, &translated, &mut batch);
     state.head.value.is_finished = true;

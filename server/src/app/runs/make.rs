@@ -4,7 +4,7 @@ use locution_engine::scan::ScanGeometry;
 
 use crate::app::site::{RunChange, RunTranslator, Site, SiteEvent};
 use crate::app::{App, AppError, Name};
-use crate::records::{Key, Run, RunHead, RunRecord, SiteRecord, codec};
+use crate::records::{Key, ReadingRules, Run, RunHead, RunRecord, SiteRecord, codec};
 use crate::storage::Batch;
 
 /// What a client says of a run before it sends scans.
@@ -14,6 +14,14 @@ pub struct NewRun {
     pub robot: Option<String>,
     /// The laser, checked.
     pub geometry: ScanGeometry,
+    /// What is said of its readings, checked.
+    pub readings: ReadingRules,
+}
+
+impl NewRun {
+    fn is_like(&self, run: &RunRecord) -> bool {
+        run.geometry == self.geometry && run.robot == self.robot && run.readings == self.readings
+    }
 }
 
 impl App {
@@ -24,9 +32,7 @@ impl App {
     /// is full.
     pub async fn make_run(&self, site: &Site, name: &Name, new: NewRun) -> Result<(Run, bool), AppError> {
         match site.run(name).await {
-            Ok(run) if run.record.geometry == new.geometry && run.record.robot == new.robot => {
-                Ok((run, false))
-            }
+            Ok(run) if new.is_like(&run.record) => Ok((run, false)),
             Ok(_) => {
                 let detail = format!("the run `{name}` stands with another geometry or robot");
                 Err(AppError::Exists { detail })
@@ -43,7 +49,8 @@ impl App {
 
     async fn create_run(&self, site: &Site, name: &Name, new: NewRun) -> Result<(Run, bool), AppError> {
         let num_runs_max = self.config().limits.num_runs_per_site_max;
-        let run = RunRecord { name: name.to_string(), robot: new.robot, geometry: new.geometry };
+        let NewRun { robot, geometry, readings } = new;
+        let run = RunRecord { name: name.to_string(), robot, geometry, readings };
         let create = |record: &mut SiteRecord, batch: &mut Batch| {
             if record.num_runs - record.num_deleted_runs >= num_runs_max {
                 return Err(AppError::invalid(
@@ -54,7 +61,7 @@ impl App {
             let idx = record.num_runs;
             record.num_runs += 1;
             batch.put(Key::RunName(run.name.clone()).encode(), codec::encode(&idx));
-            batch.put(Key::Run(idx).encode(), codec::encode(&run));
+            batch.put(Key::Run(idx).encode(), run.encode());
             batch.put(Key::RunHead(idx).encode(), codec::encode(&RunHead::default()));
             Ok(())
         };

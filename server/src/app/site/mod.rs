@@ -37,7 +37,7 @@ pub use state::{SiteState, TextConfig};
 pub use text_budget::TextBudget;
 pub use texts::Segment;
 use texts::SiteTexts;
-pub use translation::RunTranslator;
+pub use translation::{RunTranslator, Translated};
 
 /// A site that is open.
 pub struct Site {

@@ -38,7 +38,7 @@ pub struct WriterState {
     pub(in crate::app) generation: Generation,
     pub(in crate::app) head: Stored<RunHead>,
     pub(in crate::app) text: Stored<TextHead>,
-    /// None while it works elsewhere, and once the run is finished.
+    /// None while it works elsewhere, once the run is finished, and when an earlier version of the server stored it.
     pub(in crate::app) translator: Option<RunTranslator>,
 }
 
@@ -97,7 +97,10 @@ impl RunWriter {
         if text.value.is_finished {
             return Ok(WriterState { generation, head, text, translator: None });
         }
-        let mut translator = self.load_checkpoint(reader, generation, text_config, &text.value).await?;
+        let stored = self.load_checkpoint(reader, generation, text_config, &text.value).await?;
+        let Some(mut translator) = stored else {
+            return Ok(WriterState { generation, head, text, translator: None });
+        };
         let mut next = text.value.checkpoint_scans;
         while next < text.value.num_scans {
             let end = text.value.num_scans.min(next + NUM_SCANS_PER_REPLAY);
@@ -119,13 +122,10 @@ impl RunWriter {
         generation: Generation,
         text_config: &TextConfig,
         text: &TextHead,
-    ) -> Result<RunTranslator, AppError> {
+    ) -> Result<Option<RunTranslator>, AppError> {
         if text.num_checkpoint_parts == 0 {
-            return RunTranslator::new(
-                &text_config.engine,
-                &self.record.geometry,
-                text_config.quantizer.clone(),
-            );
+            let quantizer = text_config.quantizer.clone();
+            return RunTranslator::new(&text_config.engine, &self.record.geometry, quantizer).map(Some);
         }
         let key = |part| Key::Checkpoint(generation, self.idx, part).encode();
         let parts = reader.multi_get(&(0..text.num_checkpoint_parts).map(key).collect::<Vec<_>>()).await?;
@@ -138,8 +138,16 @@ impl RunWriter {
 
 impl WriterState {
     /// The translator, to work elsewhere; it must be put back before the state is used again.
+    ///
+    /// # Errors
+    /// [`AppError::NotReady`] for a run that an earlier version of the server left open.
     pub(in crate::app) fn take_translator(&mut self) -> Result<RunTranslator, AppError> {
-        self.translator.take().ok_or_else(|| AppError::internal("a run that takes scans has no translator"))
+        self.translator.take().ok_or_else(|| AppError::NotReady {
+            detail:
+                "the run was begun by an earlier version of the server, whose text this one cannot continue: \
+                     finish it and send what follows as another run"
+                    .into(),
+        })
     }
 
     /// Adds to a batch everything that translating brought, and moves the heads in memory.

@@ -9,6 +9,9 @@ use locution_engine::translator::{Translation, Translator};
 use crate::app::AppError;
 use crate::storage::StorageError;
 
+/// First byte of a stored translator. Before there was one the first byte said how odometry is treated, 0 or 1.
+const TRANSLATOR_LAYOUT: u8 = 2;
+
 /// What translating some scans brought.
 #[derive(Debug, Default)]
 pub struct Translated {
@@ -47,14 +50,23 @@ impl RunTranslator {
             .map_err(|error| AppError::invalid(error.field, error.problem))
     }
 
-    /// The translator as it was stored.
+    /// The translator as it was stored; none when an earlier version of the server stored it, whose text this one
+    /// would not go on with as it was begun.
     ///
     /// # Errors
     /// [`StorageError::Corrupt`] when the bytes are not a translator.
-    pub fn restore(bytes: &[u8]) -> Result<Self, AppError> {
-        postcard::from_bytes(bytes)
-            .map(Self)
-            .map_err(|error| StorageError::Corrupt { what: format!("a stored translator: {error}") }.into())
+    pub fn restore(bytes: &[u8]) -> Result<Option<Self>, AppError> {
+        let corrupt =
+            |problem: String| StorageError::Corrupt { what: format!("a stored translator: {problem}") };
+        let (&layout, bytes) = bytes.split_first().ok_or_else(|| corrupt("it is empty".into()))?;
+        if layout < TRANSLATOR_LAYOUT {
+            return Ok(None);
+        }
+        if layout > TRANSLATOR_LAYOUT {
+            return Err(corrupt(format!("layout {layout} is of a later version of the server")).into());
+        }
+        let translator = postcard::from_bytes(bytes).map_err(|error| corrupt(error.to_string()))?;
+        Ok(Some(Self(translator)))
     }
 
     /// The state to store.
@@ -62,7 +74,7 @@ impl RunTranslator {
     /// # Errors
     /// [`AppError::Internal`] when it cannot be written.
     pub fn store(&self) -> Result<Vec<u8>, AppError> {
-        postcard::to_allocvec(&self.0).map_err(AppError::internal)
+        postcard::to_extend(&self.0, vec![TRANSLATOR_LAYOUT]).map_err(AppError::internal)
     }
 
     /// Feeds scans in order.
@@ -79,5 +91,29 @@ impl RunTranslator {
         let mut translated = Translated::default();
         translated.add(self.0.finish());
         translated
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use locution_engine::geometry::Pose2;
+
+    use super::*;
+
+    #[test]
+    fn a_translator_of_an_earlier_version_is_told_from_a_damaged_one() {
+        let geometry = ScanGeometry {
+            num_ranges: 3,
+            angle_min_rad: -1.0,
+            angle_increment_rad: 1.0,
+            range_max_m: 10.0,
+            robot_from_laser: Pose2::identity(),
+        };
+        let translator = RunTranslator::new(&EngineConfig::default(), &geometry, None).unwrap();
+        let stored = translator.store().unwrap();
+        assert!(RunTranslator::restore(&stored).unwrap().is_some());
+        assert!(RunTranslator::restore(&stored[1..]).unwrap().is_none());
+        assert!(RunTranslator::restore(&stored[..stored.len() / 2]).is_err());
+        assert!(RunTranslator::restore(&[]).is_err());
     }
 }

@@ -24,8 +24,14 @@ pub struct ScanDto {
     #[serde(with = "nanoseconds")]
     #[schema(value_type = i64, example = 1763800000000000000i64)]
     pub timestamp_ns: i64,
-    /// Raw odometry of the robot.
-    pub odom_from_robot: PoseDto,
+    /// Raw odometry of the robot. A robot without odometry leaves it out of all scans of a run; it is then driven by
+    /// its laser alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odom_from_robot: Option<PoseDto>,
+    /// How fast the robot turned then by a gyroscope, counter-clockwise; it helps where odometry and laser are in doubt.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 0.35, minimum = -100, maximum = 100)]
+    pub angular_velocity_rad_per_s: Option<f64>,
     /// Readings in metres, in the order of the geometry's beams.
     pub ranges_m: RangesDto,
 }
@@ -36,19 +42,54 @@ impl ScanDto {
     /// # Errors
     /// 422 naming the scan, the field and the reading.
     pub fn check(self, scan_idx: usize) -> Result<Scan, ApiError> {
-        let odom_from_robot = self.odom_from_robot.check().map_err(|(name, problem)| {
-            let detail = format!("the odometry of scan {scan_idx} cannot be: {problem}");
-            ApiError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot.{name}"), detail)
-        })?;
-        let negative = self.ranges_m.0.iter().position(|range_m| *range_m < 0.0);
+        let odom_from_robot =
+            self.odom_from_robot.unwrap_or_default().check().map_err(|(name, problem)| {
+                let detail = format!("the odometry of scan {scan_idx} cannot be: {problem}");
+                ApiError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot.{name}"), detail)
+            })?;
+        let angular_velocity_rad_per_s = self.angular_velocity_rad_per_s;
+        if angular_velocity_rad_per_s
+            .is_some_and(|rate| rate.is_nan() || rate.abs() > TURN_RATE_MAX_RAD_PER_S)
+        {
+            let detail = format!("scan {scan_idx} cannot turn so fast: radians per second, not degrees");
+            let field = format!("scans[{scan_idx}].angular_velocity_rad_per_s");
+            return Err(ApiError::invalid_scan(field, detail));
+        }
+        // Minus infinity is how sensors say "too near".
+        let is_negative = |range_m: &f32| *range_m < 0.0 && range_m.is_finite();
+        let negative = self.ranges_m.0.iter().position(is_negative);
         if let Some(range_idx) = negative {
             let range_m = self.ranges_m.0[range_idx];
             let detail =
                 format!("range {range_idx} of scan {scan_idx} is {range_m} m; ranges are not negative");
             return Err(ApiError::invalid_scan(format!("scans[{scan_idx}].ranges_m[{range_idx}]"), detail));
         }
-        Ok(Scan { timestamp_ns: self.timestamp_ns, odom_from_robot, ranges_m: self.ranges_m.0 })
+        Ok(Scan {
+            timestamp_ns: self.timestamp_ns,
+            odom_from_robot,
+            angular_velocity_rad_per_s,
+            ranges_m: self.ranges_m.0,
+        })
     }
+}
+
+/// No robot turns faster.
+const TURN_RATE_MAX_RAD_PER_S: f64 = 100.0;
+
+/// Scans in order, checked one by one, all of which have odometry or none.
+///
+/// # Errors
+/// 422 naming the first scan that cannot be, with the field.
+pub fn checked_batch(first_sequence: u64, scans: Vec<ScanDto>) -> Result<NewBatch, ApiError> {
+    let has_odometry = scans.first().is_none_or(|scan| scan.odom_from_robot.is_some());
+    if let Some(scan_idx) = scans.iter().position(|scan| scan.odom_from_robot.is_some() != has_odometry) {
+        let detail = format!(
+            "scan {scan_idx} differs from scan 0: the scans of a run have odometry all of them or none"
+        );
+        return Err(ApiError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot"), detail));
+    }
+    let scans = scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
+    Ok(NewBatch { first_sequence, scans: scans.collect::<Result<_, _>>()?, has_odometry })
 }
 
 /// Scans to append to a run.
@@ -67,8 +108,7 @@ impl TryFrom<BatchDto> for NewBatch {
     type Error = ApiError;
 
     fn try_from(batch: BatchDto) -> Result<Self, ApiError> {
-        let scans = batch.scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
-        Ok(Self { first_sequence: batch.first_sequence, scans: scans.collect::<Result<_, _>>()? })
+        checked_batch(batch.first_sequence, batch.scans)
     }
 }
 
@@ -100,9 +140,12 @@ pub struct StoredScanDto {
     pub scan_seq: u64,
     /// As sent.
     pub timestamp_ns: i64,
-    /// As sent.
+    /// As sent; all zero for a robot without odometry.
     pub odom_from_robot: PoseDto,
-    /// As sent; readings without a return are null.
+    /// As sent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angular_velocity_rad_per_s: Option<f64>,
+    /// As sent; readings without a return are null, those too near or missing at the end are 0.
     pub ranges_m: RangesDto,
 }
 
@@ -113,6 +156,7 @@ impl StoredScanDto {
             scan_seq,
             timestamp_ns: scan.timestamp_ns,
             odom_from_robot: scan.odom_from_robot.into(),
+            angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
             ranges_m: RangesDto(scan.ranges_m),
         }
     }

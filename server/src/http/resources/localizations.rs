@@ -12,7 +12,7 @@ use locution_engine::recall::AnsweredPlace;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use super::batches::{BatchDto, ScanDto};
+use super::batches::{BatchDto, ScanDto, checked_batch};
 use super::runs::GeometryDto;
 use crate::app::AppError;
 use crate::app::ask::{ExampleInfo, LocalizationInfo};
@@ -206,8 +206,7 @@ impl ExampleQueryDto {
     /// # Errors
     /// 422 naming scan and field.
     pub fn batch(self) -> Result<NewBatch, ApiError> {
-        let scans = self.scans.into_iter().enumerate().map(|(idx, scan)| scan.check(idx));
-        Ok(NewBatch { first_sequence: 0, scans: scans.collect::<Result<_, _>>()? })
+        checked_batch(0, self.scans)
     }
 }
 
@@ -322,10 +321,10 @@ pub async fn open_localization(
     Extension(identity): Extension<Identity>,
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
-    let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let laser = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
     let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
-    let info = state.app.open_localization(&site, geometry, prior, owner, num_own_max).await?;
+    let info = state.app.open_localization(&site, laser, prior, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }
@@ -391,8 +390,8 @@ pub async fn query_example(
     SiteOf(site): SiteOf,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<ExampleAnswerDto>, ApiError> {
-    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let answers = state.app.find_example(&[site], &geometry, query.batch()?).await?;
+    let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let answers = state.app.find_example(&[site], (&geometry, &readings), query.batch()?).await?;
     let answer = answers.into_iter().next().ok_or_else(|| AppError::internal("a site without an answer"))?;
     Ok(Json(answer.into()))
 }
@@ -406,8 +405,8 @@ pub async fn query_example_everywhere(
     Extension(identity): Extension<Identity>,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
-    let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let sites = state.app.sites(|name| identity.may_see(name)).await?;
-    let answers = state.app.find_example(&sites, &geometry, query.batch()?).await?;
+    let answers = state.app.find_example(&sites, (&geometry, &readings), query.batch()?).await?;
     Ok(Json(answers.into_iter().map(ExampleAnswerDto::from).collect()))
 }

@@ -1,5 +1,7 @@
 //! Runs: uninterrupted recordings of one robot.
 
+use std::f64::consts::TAU;
+
 use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
@@ -14,7 +16,7 @@ use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, RunName, SiteOf};
 use crate::http::values::{Page, PageParams, PoseDto};
 use crate::http::with_location;
-use crate::records::Run;
+use crate::records::{ReadingRules, Run};
 use crate::state::AppState;
 
 /// What all scans of a run share.
@@ -25,38 +27,62 @@ pub struct GeometryDto {
     #[schema(example = 180, minimum = 1, maximum = 8_192)]
     #[serde(deserialize_with = "crate::http::whole::deserialize")]
     pub num_ranges: usize,
+    /// Fewest readings of a scan, of a laser whose number varies; those missing at the end say nothing. As many as
+    /// `num_ranges` unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 180, minimum = 1)]
+    pub num_ranges_min: Option<usize>,
     /// Direction of the first beam in the laser's frame.
     #[schema(example = -1.5708)]
     pub angle_min_rad: f64,
-    /// From one beam to the next; negative when the sweep runs clockwise.
+    /// From one beam to the next; negative when the sweep runs clockwise, as that of a laser mounted upside down.
     #[schema(example = 0.0174533)]
     pub angle_increment_rad: f64,
     /// A reading at or above this means "no return".
     #[schema(example = 81.83)]
     pub range_max_m: f64,
+    /// A reading below this, or −∞, means "too near to tell" and says nothing; 0 unless said.
+    #[serde(default)]
+    #[schema(example = 0.06, minimum = 0)]
+    pub range_min_m: f64,
     /// Where the laser sits on the robot; at its centre looking ahead unless said.
     #[serde(default)]
     pub robot_from_laser: PoseDto,
 }
 
-impl From<&ScanGeometry> for GeometryDto {
-    fn from(geometry: &ScanGeometry) -> Self {
+/// No laser that this is made for sees farther, metres: a larger number is one of millimetres.
+const RANGE_MAX_MAX_M: f64 = 1_000.0;
+
+impl GeometryDto {
+    /// The laser of a run as it was stated.
+    pub fn of(geometry: &ScanGeometry, readings: &ReadingRules) -> Self {
+        let is_fixed = readings.num_ranges_min == geometry.num_ranges;
         Self {
             num_ranges: geometry.num_ranges,
+            num_ranges_min: (!is_fixed).then_some(readings.num_ranges_min),
             angle_min_rad: geometry.angle_min_rad,
             angle_increment_rad: geometry.angle_increment_rad,
             range_max_m: geometry.range_max_m,
+            range_min_m: readings.range_min_m,
             robot_from_laser: geometry.robot_from_laser.into(),
         }
     }
-}
 
-impl GeometryDto {
-    /// The engine's geometry; what cannot be translated is refused by the engine.
+    /// The engine's geometry, and what is said of the readings; what cannot be translated is refused by the engine.
     ///
     /// # Errors
-    /// 422 for numbers that are not finite or a scan over the limit.
-    pub fn check(&self, num_ranges_max: usize) -> Result<ScanGeometry, ApiError> {
+    /// 422 for numbers that are not finite, that must be millimetres or degrees, or a scan over the limit.
+    pub fn check(&self, num_ranges_max: usize) -> Result<(ScanGeometry, ReadingRules), ApiError> {
+        self.check_units()?;
+        let num_ranges_min = self.num_ranges_min.unwrap_or(self.num_ranges);
+        if num_ranges_min == 0 || num_ranges_min > self.num_ranges {
+            let problem = "must lie between 1 and num_ranges";
+            return Err(ApiError::invalid("geometry.num_ranges_min", problem));
+        }
+        if !(self.range_min_m >= 0.0 && self.range_min_m < self.range_max_m) {
+            let problem = "must lie between 0 and range_max_m";
+            return Err(ApiError::invalid("geometry.range_min_m", problem));
+        }
         if self.num_ranges == 0 || self.num_ranges > num_ranges_max {
             let problem = format!("a scan has 1 to {num_ranges_max} readings");
             return Err(ApiError::invalid("geometry.num_ranges", problem));
@@ -64,13 +90,36 @@ impl GeometryDto {
         let robot_from_laser = self.robot_from_laser.check().map_err(|(name, problem)| {
             ApiError::invalid(format!("geometry.robot_from_laser.{name}"), problem)
         })?;
-        Ok(ScanGeometry {
+        let geometry = ScanGeometry {
             num_ranges: self.num_ranges,
             angle_min_rad: self.angle_min_rad,
             angle_increment_rad: self.angle_increment_rad,
             range_max_m: self.range_max_m,
             robot_from_laser,
-        })
+        };
+        Ok((geometry, ReadingRules { range_min_m: self.range_min_m, num_ranges_min }))
+    }
+
+    /// Tells angles that must be degrees and distances that must be millimetres.
+    fn check_units(&self) -> Result<(), ApiError> {
+        let sweep_rad = self.angle_increment_rad.abs() * self.num_ranges.saturating_sub(1) as f64;
+        let mount_rad = self.robot_from_laser.theta.abs();
+        for (field, what, value) in [
+            ("angle_min_rad", "the first beam's direction", self.angle_min_rad.abs()),
+            ("angle_increment_rad", "the sweep from the first beam to the last", sweep_rad),
+            ("robot_from_laser.theta", "the laser's heading", mount_rad),
+        ] {
+            if value > 1.001 * TAU {
+                let problem =
+                    format!("{what} is {value} rad, more than a full turn: angles are radians, not degrees");
+                return Err(ApiError::invalid(format!("geometry.{field}"), problem));
+            }
+        }
+        if self.range_max_m > RANGE_MAX_MAX_M {
+            let problem = format!("must be at most {RANGE_MAX_MAX_M}: ranges are metres, not millimetres");
+            return Err(ApiError::invalid("geometry.range_max_m", problem));
+        }
+        Ok(())
     }
 }
 
@@ -94,7 +143,8 @@ impl NewRunDto {
         if self.robot.as_ref().is_some_and(|robot| robot.len() > 256) {
             return Err(ApiError::invalid("robot", "at most 256 bytes"));
         }
-        Ok(NewRun { geometry: self.geometry.check(num_ranges_max)?, robot: self.robot })
+        let (geometry, readings) = self.geometry.check(num_ranges_max)?;
+        Ok(NewRun { robot: self.robot, geometry, readings })
     }
 }
 
@@ -135,7 +185,7 @@ impl From<Run> for RunDto {
         Self {
             run: run.record.name.clone(),
             robot: run.record.robot.clone(),
-            geometry: GeometryDto::from(&run.record.geometry),
+            geometry: GeometryDto::of(&run.record.geometry, &run.record.readings),
             state: if run.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
             next_sequence: run.head.next_sequence,
             num_scans: run.head.next_sequence,

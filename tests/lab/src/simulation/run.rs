@@ -97,7 +97,7 @@ pub fn simulate_run(
         // Microseconds, as the logs write them.
         let timestamp_ns = (idx as f64 * config.drive.scan_period_s * 1e6).round() as i64 * 1000;
         let odom_from_robot = odometry.advance(&world_from_robot, &mut odometry_rng);
-        scans.push(Scan { timestamp_ns, odom_from_robot, ranges_m });
+        scans.push(Scan { timestamp_ns, odom_from_robot, angular_velocity_rad_per_s: None, ranges_m });
         truth.push(TruthPose { timestamp_ns, truth_from_robot: world_from_robot });
     }
     Ok(SimulatedRun { geometry, scans, truth })
