@@ -55,6 +55,8 @@ pub struct MappingConfig {
     pub max_search_m: f64,
     /// Widest search around the predicted heading, radians.
     pub max_search_turn_rad: f64,
+    /// Of all passes beside a place the nearest so many are registered with it.
+    pub max_passes: usize,
     /// Rounds of guided matching at most.
     pub max_rounds: usize,
     /// A registration is refused when its squared deviations from the prediction exceed this.
@@ -73,6 +75,10 @@ pub struct MappingConfig {
     pub max_candidates_per_pair: usize,
     /// Anchors whose registrations must agree before a joined map is tried.
     pub min_seeds: usize,
+    /// Groups of candidates that agree, of every two maps, of which some are registered.
+    pub max_ways: usize,
+    /// Candidates of a group that are registered.
+    pub max_probes: usize,
     /// Ways to join two maps that are tried.
     pub max_hypotheses: usize,
     /// Share of the returns of one map that another may contradict where they overlap, in the direction in which it is
@@ -113,6 +119,7 @@ impl Default for MappingConfig {
             neighbor_distance_m: 5.0,
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
+            max_passes: 8,
             max_rounds: 8,
             max_chi2: 16.0,
             min_support: 2,
@@ -122,6 +129,8 @@ impl Default for MappingConfig {
             max_ambiguity: 0.7,
             max_candidates_per_pair: 600,
             min_seeds: 2,
+            max_ways: 8,
+            max_probes: 10,
             max_hypotheses: 3,
             max_contradiction: 0.04,
             max_contradiction_ratio: 1.4,

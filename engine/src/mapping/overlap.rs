@@ -5,8 +5,8 @@
 //! saw is compared as it lies, nothing is moved. How much contradiction a true overlap brings depends on the place:
 //! people, doors and glass make a run contradict itself, and that is what a join is measured by.
 
-use super::anchors::AnchorSet;
-use crate::geometry::Pose2;
+use super::coarse_graph::CoarseGraph;
+use super::indices::AnchorIdx;
 use crate::registration::Opinions;
 
 /// Submaps whose anchors are farther apart have little in common, metres.
@@ -14,35 +14,35 @@ const REACH_M: f64 = 6.0;
 /// Submaps of the host compared with one of the guest.
 const MAX_HOSTS: usize = 4;
 
-/// Compares every guest anchor with the host anchors nearest to it, at these poses.
-pub(crate) fn overlap(set: &AnchorSet, poses: &[Pose2], guests: &[usize], hosts: &[usize]) -> Opinions {
-    let mut all = Opinions::default();
+/// What one anchor of the guest and the host around it say of each other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalOpinions {
+    pub guest: AnchorIdx,
+    pub opinions: Opinions,
+}
+
+/// Compares every guest anchor that lies on the host with the host anchors nearest to it, at the graph's poses.
+pub(crate) fn overlap(
+    graph: &CoarseGraph<'_>,
+    guests: &[AnchorIdx],
+    hosts: &[AnchorIdx],
+) -> Vec<LocalOpinions> {
+    let mut found = Vec::new();
     for &guest in guests {
-        let mut near: Vec<(f64, usize)> = hosts
+        let mut near: Vec<(f64, AnchorIdx)> = hosts
             .iter()
-            .map(|&host| (poses[host].distance(&poses[guest]), host))
+            .map(|&host| (graph.pose(host).distance(&graph.pose(guest)), host))
             .filter(|(distance_m, _)| *distance_m < REACH_M)
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut opinions = Opinions::default();
         for &(_, host) in near.iter().take(MAX_HOSTS) {
-            let host_from_guest = poses[host].between(&poses[guest]);
-            all += Opinions::of(&set.submaps[host], &set.submaps[guest], &host_from_guest);
+            let host_from_guest = graph.pose(host).between(&graph.pose(guest));
+            opinions += Opinions::of(graph.site.submap(host), graph.site.submap(guest), &host_from_guest);
+        }
+        if !near.is_empty() {
+            found.push(LocalOpinions { guest, opinions });
         }
     }
-    all
-}
-
-/// What the places of a run say of those a little later, which were seen by other scans.
-pub(crate) fn own_opinions(set: &AnchorSet, run_idx: usize, submap_half_length_m: f64) -> Opinions {
-    let range = set.of_run(run_idx);
-    let mut all = Opinions::default();
-    for from in range.clone() {
-        let here = &set.anchors[from];
-        let apart_m = here.travel_m + 2.0 * submap_half_length_m;
-        let to = range.start + set.anchors[range.clone()].partition_point(|anchor| anchor.travel_m < apart_m);
-        let Some(there) = set.anchors[..range.end].get(to) else { break };
-        let relative = here.run_from_anchor.between(&there.run_from_anchor);
-        all += Opinions::of(&set.submaps[from], &set.submaps[to], &relative);
-    }
-    all
+    found
 }

@@ -1,0 +1,136 @@
+//! Simulated robots, driven once and kept on disk: simulating and translating costs more than mapping.
+
+use std::io::Read;
+use std::path::PathBuf;
+
+use locution_engine::config::EngineConfig;
+use locution_engine::formats::{CarmenOptions, GrayImage, parse_map_server_yaml, read_carmen_log};
+use locution_engine::geometry::Pose2;
+use locution_engine::mapping::{Keyframe, RunRecord};
+use locution_engine::scan::{Scan, ScanGeometry};
+use locution_engine::simulation::{PeopleConfig, SimulationConfig, Task, World, simulate_run};
+use locution_engine::text::{Observation, Word};
+use locution_engine::translator::{Translation, Translator};
+use serde::{Deserialize, Serialize};
+
+use crate::Failure;
+
+/// A robot's drive, translated, with the true pose of every keyframe where it is known.
+#[derive(Clone, Serialize, Deserialize)]
+pub struct Driven {
+    /// World or building.
+    pub place: String,
+    geometry: ScanGeometry,
+    observations: Vec<Observation>,
+    words: Vec<Word>,
+    pub keyframes: Vec<Keyframe>,
+    /// True poses of the keyframes; empty when nobody knows.
+    pub truth: Vec<Pose2>,
+}
+
+impl Driven {
+    /// A robot that wanders through a world of the data sets while people walk there.
+    pub fn wandering(world: &str, length_m: f64, num_people: usize, seed: u64) -> Result<Self, Failure> {
+        let kept = cache_folder()?.join(format!("{world}-{length_m}-{num_people}-{seed}.postcard"));
+        if let Ok(bytes) = std::fs::read(&kept) {
+            return Ok(postcard::from_bytes(&bytes)?);
+        }
+        let people = PeopleConfig { num_people, ..PeopleConfig::default() };
+        let config = SimulationConfig { people, ..SimulationConfig::default() };
+        let task = Task::Wander { length_m, start: None };
+        let simulated = simulate_run(&read_world(world)?, &task, &config, seed)?;
+        let mut run = Self::translated(world, simulated.geometry.clone(), &simulated.scans)?;
+        let true_pose = |keyframe: &Keyframe| simulated.truth[keyframe.scan_seq as usize].truth_from_robot;
+        run.truth = run.keyframes.iter().map(true_pose).collect();
+        std::fs::write(&kept, postcard::to_allocvec(&run)?)?;
+        Ok(run)
+    }
+
+    /// A recording of the data sets.
+    pub fn recorded(name: &str) -> Result<Self, Failure> {
+        let kept = cache_folder()?.join(format!("{name}.postcard"));
+        if let Ok(bytes) = std::fs::read(&kept) {
+            return Ok(postcard::from_bytes(&bytes)?);
+        }
+        let file = std::fs::File::open(datasets().join("laser").join(format!("{name}.log.gz")))?;
+        let mut bytes = Vec::new();
+        flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes)?;
+        let text = String::from_utf8_lossy(&bytes);
+        let log = read_carmen_log(text.lines(), &CarmenOptions::default())?;
+        let run = Self::translated(name, log.geometry.clone(), &log.scans)?;
+        std::fs::write(&kept, postcard::to_allocvec(&run)?)?;
+        Ok(run)
+    }
+
+    /// A recording as a server would translate it.
+    pub fn translated(place: &str, geometry: ScanGeometry, scans: &[Scan]) -> Result<Self, Failure> {
+        let mut translator = Translator::new(&EngineConfig::default().translator, geometry.clone())?;
+        let mut run = Self {
+            place: place.to_owned(),
+            geometry,
+            observations: Vec::new(),
+            words: Vec::new(),
+            keyframes: Vec::new(),
+            truth: Vec::new(),
+        };
+        for scan in scans {
+            run.take(translator.push(scan), scans);
+        }
+        run.take(translator.finish(), scans);
+        Ok(run)
+    }
+
+    fn take(&mut self, translation: Translation, scans: &[Scan]) {
+        self.observations.extend(translation.observations);
+        self.words.extend(translation.words);
+        if let Some(pose) = translation.keyframe {
+            self.keyframes.push(Keyframe {
+                scan_seq: pose.scan_seq,
+                timestamp_ns: pose.timestamp_ns,
+                odom_from_robot: pose.odom_from_robot,
+                run_from_robot: pose.run_from_robot,
+                motion_covariance: pose.motion_covariance,
+                ranges_m: scans[pose.scan_seq as usize].ranges_m.clone(),
+            });
+        }
+    }
+
+    pub fn record(&self) -> RunRecord<'_> {
+        RunRecord {
+            geometry: &self.geometry,
+            observations: &self.observations,
+            words: &self.words,
+            keyframes: &self.keyframes,
+        }
+    }
+}
+
+/// Where drives are kept between trials.
+fn cache_folder() -> Result<PathBuf, Failure> {
+    let folder = std::env::temp_dir().join("locution-drives");
+    std::fs::create_dir_all(&folder)?;
+    Ok(folder)
+}
+
+/// Where the data sets are.
+pub fn datasets() -> PathBuf {
+    std::env::var_os("LOCUTION_DATASETS").map_or_else(
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/datasets"),
+        PathBuf::from,
+    )
+}
+
+fn read_world(name: &str) -> Result<World, Failure> {
+    let folder = datasets().join("worlds");
+    let yaml = parse_map_server_yaml(&std::fs::read_to_string(folder.join(format!("{name}.yaml")))?)?;
+    let mut decoder =
+        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join(&yaml.image))?));
+    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
+    let mut reader = decoder.read_info()?;
+    let mut pixels = vec![0; reader.output_buffer_size().ok_or("the picture is too large")?];
+    let frame = reader.next_frame(&mut pixels)?;
+    let samples = frame.color_type.samples();
+    let pixels = pixels[..frame.buffer_size()].iter().step_by(samples).copied().collect();
+    let image = GrayImage { width: frame.width as usize, height: frame.height as usize, pixels };
+    Ok(World::from_map_server(&image, &yaml)?)
+}

@@ -1,0 +1,81 @@
+//! Trials of the map builder with simulated robots: fleets, orders of making, growth (SPEC section 9).
+
+mod driven;
+mod fleets;
+mod order;
+
+use driven::Driven;
+use fleets::{FleetReport, judged, mapped};
+
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+const LENGTH_M: f64 = 150.0;
+const NUM_PEOPLE: usize = 2;
+
+fn main() -> Result<(), Failure> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
+        ["fleets", first_seed, num_fleets, worlds @ ..] => {
+            all_fleets(first_seed.parse()?, num_fleets.parse()?, worlds)
+        }
+        ["order", "recordings", names @ ..] => {
+            let runs = names.iter().map(|name| Driven::recorded(name)).collect::<Result<Vec<_>, _>>()?;
+            order::all_orders(&names.join(" "), &runs)
+        }
+        ["order", "fleet", world, first_seed] => {
+            let first_seed: u64 = first_seed.parse()?;
+            let runs = (first_seed..first_seed + 3)
+                .map(|seed| Driven::wandering(world, LENGTH_M, NUM_PEOPLE, seed))
+                .collect::<Result<Vec<_>, _>>()?;
+            order::all_orders(&format!("{world} {first_seed}"), &runs)
+        }
+        ["growth", num_runs, world] => growth(num_runs.parse()?, world),
+        _ => Err("say `fleets FIRST_SEED NUM WORLD…` or `growth RUNS WORLD`".into()),
+    }
+}
+
+fn all_fleets(first_seed: u64, num_fleets: u64, worlds: &[&str]) -> Result<(), Failure> {
+    let mut reports = Vec::new();
+    for world in worlds {
+        for fleet in 0..num_fleets {
+            let seeds = (0..3).map(|robot| first_seed + 3 * fleet + robot);
+            let runs = seeds
+                .map(|seed| Driven::wandering(world, LENGTH_M, NUM_PEOPLE, seed))
+                .collect::<Result<Vec<_>, _>>()?;
+            for (i, run) in runs.iter().enumerate() {
+                let t: Vec<[f32; 3]> =
+                    run.truth.iter().map(|p| [p.x as f32, p.y as f32, p.theta as f32]).collect();
+                eprintln!("TRUTH {i} {}", serde_json::to_string(&t)?);
+            }
+            let (map, seconds) = mapped(&runs)?;
+            let report = judged(&format!("{world} {}", first_seed + 3 * fleet), &runs, &map, seconds);
+            println!("{}", serde_json::to_string(&report)?);
+            reports.push(report);
+        }
+    }
+    let count = |of: &dyn Fn(&FleetReport) -> bool| reports.iter().filter(|report| of(report)).count();
+    println!(
+        "{} fleets: {} with false joins, {} with missed joins, {} of {} that should be one are",
+        reports.len(),
+        count(&|report| !report.false_joins.is_empty()),
+        count(&|report| !report.missed_joins.is_empty()),
+        count(&|report| report.should_be_one && report.num_components == 1),
+        count(&|report| report.should_be_one)
+    );
+    Ok(())
+}
+
+fn growth(num_runs: u64, world: &str) -> Result<(), Failure> {
+    let runs = (0..num_runs)
+        .map(|run| {
+            let world = if run % 2 == 0 { world.to_owned() } else { format!("{world}-furniture") };
+            let mut run = Driven::wandering(&world, 80.0, 3, 500 + run)?;
+            run.place = "same".to_owned();
+            Ok(run)
+        })
+        .collect::<Result<Vec<_>, Failure>>()?;
+    let (map, seconds) = mapped(&runs)?;
+    let report = judged(&format!("{world} growth {num_runs}"), &runs, &map, seconds);
+    println!("{} matches, {} refused, {}", map.matches.len(), map.refused.len(), serde_json::to_string(&report)?);
+    Ok(())
+}

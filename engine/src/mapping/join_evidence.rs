@@ -1,0 +1,122 @@
+//! What speaks for and against a join of two components, once they are laid over each other.
+
+use std::collections::BTreeSet;
+
+use nalgebra::Matrix2;
+
+use super::component::{Component, Workshop};
+use super::config::MappingConfig;
+use super::indices::AnchorIdx;
+use super::overlap::{LocalOpinions, overlap};
+use crate::registration::Opinions;
+
+/// How well a joined map holds between host and guest.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct JoinEvidence {
+    /// Different anchors of the guest that fit.
+    pub num_anchors: usize,
+    /// Share of the tried guest anchors that fit anywhere.
+    pub share: f64,
+    /// Standard deviation of the worst direction, metres.
+    pub worst_sd_m: f64,
+    /// Share of the returns of the two that contradict each other wherever they overlap.
+    pub contradiction: f64,
+    /// The share that the one contradicts of what the other saw, whichever way is less: furniture that came or went
+    /// counts only one way.
+    pub one_sided_contradiction: f64,
+    /// The same over the worst ten metres or so.
+    pub worst_stretch: f64,
+    /// Guest anchors that lie on the host.
+    pub num_overlapping: usize,
+    pub of_later: f64,
+    pub of_earlier: f64,
+    /// Contradiction between places of one run, the worse of the two maps.
+    pub own_contradiction: f64,
+    pub own_least: f64,
+    /// True when the joined map brings together what a person said are different places.
+    pub is_vetoed: bool,
+}
+
+impl JoinEvidence {
+    /// Judges two components laid over each other by their closures and all pairs that were tried.
+    pub fn of(
+        both: &Component<'_>,
+        host: &Component<'_>,
+        guest: &Component<'_>,
+        tried: &[(AnchorIdx, AnchorIdx)],
+        workshop: Workshop<'_>,
+    ) -> Self {
+        let graph = &both.graph;
+        let guest_of = |a: AnchorIdx, b: AnchorIdx| if guest.graph.holds(a) { a } else { b };
+        let is_across = |a: AnchorIdx, b: AnchorIdx| guest.graph.holds(a) != guest.graph.holds(b);
+        let fitting: Vec<_> =
+            both.closures.iter().filter(|closure| is_across(closure.earlier, closure.later)).collect();
+        let anchors: BTreeSet<AnchorIdx> =
+            fitting.iter().map(|closure| guest_of(closure.earlier, closure.later)).collect();
+        let tried: BTreeSet<AnchorIdx> = tried
+            .iter()
+            .filter(|(a, b)| graph.pose(*a).distance(&graph.pose(*b)) < 2.0)
+            .map(|(a, b)| guest_of(*a, *b))
+            .collect();
+        let mut information = Matrix2::zeros();
+        for closure in &fitting {
+            let in_map =
+                crate::registration::rotated(&closure.fit.covariance, graph.pose(closure.earlier).theta);
+            let place = in_map.fixed_view::<2, 2>(0, 0).into_owned() + Matrix2::identity() * 0.01;
+            information += place.try_inverse().unwrap_or_else(Matrix2::zeros);
+        }
+        let weakest = information.symmetric_eigenvalues().min();
+        let mut opinions = Opinions::default();
+        let locals = overlap(graph, guest.graph.anchors(), host.graph.anchors());
+        for local in &locals {
+            opinions += local.opinions;
+        }
+        let near_m = graph.site.config.neighbor_distance_m;
+        Self {
+            num_anchors: anchors.len(),
+            share: tried.intersection(&anchors).count() as f64 / tried.len().max(1) as f64,
+            worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
+            contradiction: opinions.all().contradiction(),
+            one_sided_contradiction: (opinions.of_later.contradiction())
+                .min(opinions.of_earlier.contradiction()),
+            worst_stretch: worst_stretch(&locals),
+            num_overlapping: locals.len(),
+            of_later: opinions.of_later.contradiction(),
+            of_earlier: opinions.of_earlier.contradiction(),
+            own_contradiction: own_contradiction(guest).max(own_contradiction(host)),
+            own_least: own_contradiction(guest).min(own_contradiction(host)),
+            is_vetoed: workshop.judgements.contradict(graph, near_m, |anchor| guest.graph.holds(anchor)),
+        }
+    }
+
+    /// True when the joined map may stand.
+    pub fn holds(&self, config: &MappingConfig) -> bool {
+        self.num_anchors >= config.min_joining_anchors
+            && self.share >= config.min_joining_share
+            && self.worst_sd_m <= config.max_joining_sd_m
+            && (self.one_sided_contradiction <= config.max_contradiction
+                || self.contradiction <= config.max_contradiction_ratio * self.own_contradiction)
+    }
+}
+
+/// Anchors of a stretch: about ten metres.
+const STRETCH: usize = 5;
+
+/// The contradiction of the stretch of the guest's drive where it is largest, in the direction in which it is less.
+fn worst_stretch(locals: &[LocalOpinions]) -> f64 {
+    let stretches = locals.windows(STRETCH.min(locals.len()).max(1));
+    stretches.fold(0.0, |worst, stretch| {
+        let mut opinions = Opinions::default();
+        stretch.iter().for_each(|local| opinions += local.opinions);
+        worst.max(opinions.of_later.contradiction().min(opinions.of_earlier.contradiction()))
+    })
+}
+
+/// How much the runs of a component contradict themselves.
+fn own_contradiction(component: &Component<'_>) -> f64 {
+    let mut all = Opinions::default();
+    for &run in component.graph.runs() {
+        all += component.graph.site.own_opinions(run);
+    }
+    all.all().contradiction()
+}
