@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::PI;
+use std::path::PathBuf;
 
 use locution_server::config::ServerConfig;
 use locution_server::{RunningServer, start_server};
@@ -50,6 +51,17 @@ impl TestServer {
     pub async fn stop(self) {
         self.server.shutdown().await.unwrap();
     }
+}
+
+/// The binary named by `LOCUTION_BIN`, else built here in the profile of the tests.
+pub fn locution_binary() -> PathBuf {
+    if let Some(path) = std::env::var_os("LOCUTION_BIN") {
+        return path.into();
+    }
+    let build = escargot::CargoBuild::new().package("locution-cli").bin("locution");
+    let is_release = std::env::current_exe().unwrap().iter().any(|folder| folder == "release");
+    let build = if is_release { build.release() } else { build };
+    build.run().unwrap().path().to_owned()
 }
 
 /// Requests by hand, so that tests see what any client would see.

@@ -9,21 +9,27 @@ const MAX_FILE_LINES: usize = 500;
 /// Longest function, in lines.
 const MAX_FUNCTION_LINES: usize = 80;
 
-/// Rooms of the engine in the order of the data flow, with the rooms that each may use besides `geometry`, `config`
-/// and itself.
-const ROOMS: &[(&str, &[&str])] = &[
-    ("geometry", &[]),
-    ("scan", &[]),
-    ("grid", &["scan"]),
-    ("density", &["scan", "grid"]),
-    ("text", &["scan", "grid", "density"]),
-    ("index", &["text"]),
-    ("matching", &["text", "index"]),
-    ("retrieval", &["text", "index", "matching"]),
-    ("registration", &["scan", "grid"]),
-    ("pose_graph", &[]),
-    ("formats", &["scan", "pose_graph"]),
-    ("evaluation", &["formats", "mapping", "text"]),
+/// Rooms that every room of the engine may use.
+const GROUND: [&str; 2] = ["geometry", "config_error"];
+
+/// Stems of words that names spell in one way, and the other way.
+const SPELLINGS: &[(&str, &str)] = &[
+    ("localis", "localiz"),
+    ("optimis", "optimiz"),
+    ("factoris", "factoriz"),
+    ("normalis", "normaliz"),
+    ("minimis", "minimiz"),
+    ("quantis", "quantiz"),
+    ("recognis", "recogniz"),
+    ("summaris", "summariz"),
+    ("serialis", "serializ"),
+    ("initialis", "initializ"),
+    ("centre", "center"),
+    ("colour", "color"),
+    ("grey", "gray"),
+    ("neighbour", "neighbor"),
+    ("labelled", "labeled"),
+    ("metre", "meter"),
 ];
 
 struct Source {
@@ -108,26 +114,65 @@ fn the_engine_is_pure() {
     check(forbid(&sources("engine/src"), &forbidden));
 }
 
+/// The rows of ARCHITECTURE's table: a room of the engine and the rooms that it may use.
+fn rooms() -> Vec<(String, Vec<String>)> {
+    let text =
+        fs::read_to_string(workspace().join("ARCHITECTURE.md")).expect("the page is part of the repository");
+    let table = text.split("## Rooms of the engine").nth(1).expect("the page has the table");
+    let table = table.split("\n## ").next().unwrap_or_default();
+    let names = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split('|').collect();
+        let room = names(cells.get(1)?).first()?.clone();
+        Some((room, names(cells.get(3)?)))
+    };
+    let rooms: Vec<_> = table.lines().filter(|line| line.starts_with("| `")).filter_map(row).collect();
+    assert!(rooms.len() > 15, "the table of rooms was not read: {rooms:?}");
+    rooms
+}
+
 #[test]
-fn rooms_use_only_the_rooms_before_them() {
+fn every_room_of_the_engine_has_a_row_and_keeps_to_it() {
+    let rooms = rooms();
     let mut complaints = Vec::new();
-    for (room, may_use) in ROOMS {
-        let in_room = |source: &&Source| {
-            let path = source.path.to_string_lossy().replace('\\', "/");
-            path.contains(&format!("engine/src/{room}/")) || path.ends_with(&format!("engine/src/{room}.rs"))
+    for source in sources("engine/src") {
+        let path = source.path.to_string_lossy().replace('\\', "/");
+        let inside = path.split("engine/src/").nth(1).unwrap_or_default();
+        let room = inside.split('/').next().unwrap_or_default().trim_end_matches(".rs");
+        if room == "lib" {
+            continue;
+        }
+        let Some((_, may_use)) = rooms.iter().find(|(name, _)| name == room) else {
+            complaints.push(source.complaint(0, &format!("`{room}` has no row in ARCHITECTURE.md")));
+            continue;
         };
-        for source in sources("engine/src").iter().filter(in_room) {
-            for (line_idx, line) in source.statements() {
-                for used in line.split("crate::").skip(1).filter_map(|rest| {
-                    rest.split(|c: char| !c.is_alphanumeric() && c != '_')
-                        .next()
-                        .filter(|name| !name.is_empty())
-                }) {
-                    let allowed =
-                        used == *room || ["geometry", "config"].contains(&used) || may_use.contains(&used);
-                    if !allowed {
-                        complaints
-                            .push(source.complaint(line_idx, &format!("`{room}` may not use `{used}`")));
+        for (line_idx, line) in source.statements() {
+            let used = line.split("crate::").skip(1);
+            let used = used.filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next());
+            for used in used.filter(|used| !used.is_empty() && *used != room && !GROUND.contains(used)) {
+                if !may_use.iter().any(|allowed| allowed == used) {
+                    complaints.push(source.complaint(line_idx, &format!("`{room}` may not use `{used}`")));
+                }
+            }
+        }
+    }
+    check(complaints);
+}
+
+#[test]
+fn names_are_spelled_in_one_way() {
+    let mut complaints = Vec::new();
+    for folder in ["engine", "server/src", "clients", "openapi", "tests"] {
+        for source in sources(folder) {
+            for (line_idx, line) in source.text.lines().enumerate() {
+                let code = line.split("//").next().unwrap_or_default();
+                let outside_strings: String =
+                    code.split('"').step_by(2).collect::<Vec<_>>().join(" ").to_lowercase();
+                for (stem, right) in SPELLINGS {
+                    if outside_strings.contains(stem) {
+                        complaints.push(
+                            source.complaint(line_idx, &format!("`{stem}…` is spelled `{right}…` in names")),
+                        );
                     }
                 }
             }
@@ -163,8 +208,7 @@ fn use_cases_and_storage_know_no_http() {
 
 #[test]
 fn clients_speak_only_http() {
-    let complaints = forbid(&sources("clients"), &["locution_engine", "locution_server"]);
-    check(complaints);
+    check(forbid(&sources("clients/rust"), &["locution_engine", "locution_server"]));
     let manifest =
         fs::read_to_string(workspace().join("clients/rust/Cargo.toml")).expect("the client has a manifest");
     assert!(!manifest.contains("locution-engine") && !manifest.contains("locution-server"));

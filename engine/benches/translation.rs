@@ -16,7 +16,6 @@ use std::path::PathBuf;
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use literal::density::{Content, literal_flood, literal_groups};
 use literal::local_map::LiteralMap;
-use locution_engine::config::{OdometrySource, TranslatorConfig};
 use locution_engine::density::{DensityConfig, DensityEstimator, KernelConfig};
 use locution_engine::formats::{CarmenOptions, read_carmen_log};
 use locution_engine::geometry::{Point2, Pose2};
@@ -24,6 +23,7 @@ use locution_engine::grid::{LocalMap, LocalMapConfig};
 use locution_engine::sampling::SamplingConfig;
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
+use locution_engine::translator::{OdometrySource, TranslatorConfig};
 
 fn geometry() -> ScanGeometry {
     ScanGeometry {

@@ -6,22 +6,22 @@
 //!
 //! Read the rooms in the order of the data flow:
 //! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] →
-//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`localization`],
-//! [`recall`] and [`semantics`], which read a map, and [`formats`],
-//! [`simulation`] and [`evaluation`], which feed and judge it.
+//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`occupancy`], what is drawn
+//! of a map, [`locate`], [`recall`] and [`semantics`], which read it, and [`formats`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 pub mod config;
+pub mod config_error;
 pub mod density;
-pub mod evaluation;
 pub mod formats;
 pub mod geometry;
 pub mod grid;
 pub mod index;
-pub mod localization;
+pub mod locate;
 pub mod mapping;
 pub mod matching;
+pub mod occupancy;
 pub mod pose_graph;
 pub mod recall;
 pub mod registration;
@@ -29,6 +29,5 @@ pub mod retrieval;
 pub mod sampling;
 pub mod scan;
 pub mod semantics;
-pub mod simulation;
 pub mod text;
 pub mod translator;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::{ConfigError, OdometrySource, TranslatorConfig};
+use crate::config_error::ConfigError;
 use crate::density::DensityEstimator;
 use crate::geometry::Pose2;
 use crate::grid::{Cell, LocalMap};
@@ -10,6 +10,10 @@ use crate::registration::OdometryRefiner;
 use crate::sampling::{KeyframePose, KeyframeSampler, Place, PlaceSampler};
 use crate::scan::{Scan, ScanGeometry};
 use crate::text::{Observation, Quantizer, TextBuilder, Word};
+
+mod config;
+
+pub use config::{OdometrySource, TranslatorConfig};
 
 /// What one scan, or the end of a run, added.
 #[derive(Clone, Debug, Default, PartialEq)]

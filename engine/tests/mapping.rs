@@ -9,9 +9,9 @@ use locution_engine::mapping::{
     place_in_map,
 };
 use locution_engine::scan::ScanGeometry;
-use locution_engine::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::Translator;
+use locution_lab::simulation::{SimulatedRun, SimulationConfig, Task, World, simulate_run};
 
 /// A run as the map builder sees it, with the truth of the simulator.
 struct Driven {

@@ -5,12 +5,12 @@
 use std::io::Read;
 use std::path::PathBuf;
 
-use locution_engine::config::TranslatorConfig;
 use locution_engine::formats::{CarmenOptions, read_carmen_log};
 use locution_engine::geometry::Pose2;
 use locution_engine::sampling::SamplingConfig;
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::text::{Observation, TextBuilder, Word};
+use locution_engine::translator::TranslatorConfig;
 use locution_engine::translator::{Translation, Translator};
 use proptest::prelude::*;
 

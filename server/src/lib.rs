@@ -4,7 +4,7 @@
 //! router ─► handlers ─► dto (checks) ─► app (use cases) ─► engine (pure) and storage (ordered bytes)
 //! ```
 //!
-//! [`start_server`] puts the parts together; the binary and every test call it.
+//! [`start_server`] puts the parts together; the command line and every test call it.
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 use std::net::SocketAddr;
@@ -19,7 +19,6 @@ use tokio::task::JoinHandle;
 
 pub mod app;
 pub mod auth;
-pub mod cli;
 pub mod config;
 pub mod dto;
 pub mod error;

@@ -5,7 +5,7 @@
 use std::fmt::Write;
 
 use locution_engine::geometry::Point2;
-use locution_engine::localization::{CellState, GridMap};
+use locution_engine::occupancy::{CellState, GridMap};
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, Rect, Stroke, Transform};
 
 /// Longest edge of a picture, pixels.

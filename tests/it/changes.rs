@@ -1,7 +1,7 @@
 //! What changed between two sessions: a drawn office, driven twice, with a cabinet moved in between.
 
 use locution_engine::geometry::{Point2, Pose2};
-use locution_engine::simulation::{SimulationConfig, Task, World, simulate_run};
+use locution_lab::simulation::{SimulationConfig, Task, World, simulate_run};
 use locution_tests::{Api, TestServer};
 use serde_json::{Value, json};
 

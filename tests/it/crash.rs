@@ -1,7 +1,7 @@
 //! The real binary, killed at random moments, loses nothing that it acknowledged and never shows half a change.
 
 use std::io::{BufRead, BufReader};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -54,15 +54,6 @@ impl Drop for Process {
     }
 }
 
-/// The binary named by `LOCUTION_BIN`, else built here.
-fn binary() -> PathBuf {
-    if let Some(path) = std::env::var_os("LOCUTION_BIN") {
-        return path.into();
-    }
-    let build = escargot::CargoBuild::new().package("locution-server").bin("locution").release();
-    build.run().unwrap().path().to_owned()
-}
-
 async fn post(api: &Api, first: usize, scans: &[Value]) -> Option<Value> {
     let body = serde_json::to_vec(&json!({"first_sequence": first, "scans": scans})).unwrap();
     let headers = [("content-type", "application/json")];
@@ -97,7 +88,7 @@ async fn everything(api: &Api) -> Vec<String> {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn twenty_kills_lose_nothing_and_change_no_byte() {
-    let binary = binary();
+    let binary = locution_tests::locution_binary();
     let scans = drive(6_000, 11);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     let directory = tempfile::tempdir().unwrap();
@@ -153,7 +144,7 @@ async fn twenty_kills_lose_nothing_and_change_no_byte() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_kill_while_new_texts_are_written_leaves_the_old_ones() {
-    let binary = binary();
+    let binary = locution_tests::locution_binary();
     let scans = drive(1_000, 12);
     let directory = tempfile::tempdir().unwrap();
     let mut process = start_with_mean_shift(&binary, directory.path(), &scans).await;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// The largest radius a map may have, in cells: squared distances then fit 16 bits.
 const MAX_RADIUS_CELLS: f64 = 255.0;

@@ -6,7 +6,7 @@ use super::lattice::{Lattice, num_nodes_covered};
 use super::occurrence::ClassSet;
 use super::packed::PackedWord;
 use super::tolerance::{Syllables, WordTolerance, binary_angle};
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// What a word of a pattern may be; all bounds inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,10 +9,10 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
-use super::occupancy::{CellCounts, CellIndex, OccupancyConfig, TiledOccupancy};
 use super::run::Keyframe;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::geometry::{Point2, Pose2};
+use crate::occupancy::{CellCounts, CellIndex, OccupancyConfig, TiledOccupancy};
 use crate::scan::ScanGeometry;
 
 /// One run placed in the map.

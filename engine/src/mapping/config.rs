@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::changes::ChangesConfig;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::pose_graph::{ConsistencyConfig, PoseGraphConfig, RobustConfig};
 use crate::registration::SubmapConfig;
 use crate::retrieval::RetrievalConfig;

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use super::clique::largest_clique;
 use super::support::Uncertain;
 use super::{Components, CovarianceSolver, PoseConstraint, PoseGraph, PoseGraphError};
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// Settings of [`consistent_sets`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 use super::InformationError;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// A graph that cannot be built or solved. Poses and constraints are named by their index.
 #[derive(Clone, Debug, PartialEq, Error)]

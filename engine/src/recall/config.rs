@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::calibration::Calibration;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::registration::SubmapConfig;
 use crate::retrieval::RetrievalConfig;
 

@@ -1,13 +1,14 @@
 //! A short recording, translated and made ready to be looked for.
 
 use super::config::RecallConfig;
-use crate::config::{ConfigError, TranslatorConfig};
+use crate::config_error::ConfigError;
 use crate::geometry::{Point2, Pose2};
 use crate::registration::{AreaSearch, Submap, SubmapScan};
 use crate::retrieval::RunProfile;
 use crate::scan::{Scan, ScanGeometry};
 use crate::text::Observation;
 use crate::translator::Translator;
+use crate::translator::TranslatorConfig;
 
 /// Travel at the end of a recording that settles where exactly it ends, metres.
 const TAIL_M: f64 = 5.0;

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::geometry::Pose2;
 
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// When observations and keyframes are taken.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

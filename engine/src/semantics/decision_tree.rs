@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::label::PlaceLabel;
 use super::segmentation::{Segment, SegmentationConfig, segments};
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 use crate::text::Observation;
 
 /// Thresholds of Table 6.4.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::quantizer::Quantizer;
-use crate::config::ConfigError;
+use crate::config_error::ConfigError;
 
 /// How densities become classes (thesis 4.2.1, SPEC 3.5).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use locution_engine::config::ConfigError;
+use locution_engine::config_error::ConfigError;
 use thiserror::Error;
 
 use crate::storage::StorageError;

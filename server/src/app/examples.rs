@@ -8,7 +8,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
-use locution_engine::localization::LocalizationState;
+use locution_engine::locate::LocalizationState;
 use locution_engine::mapping::{Keyframe, MappedRun, place_in_map};
 use locution_engine::recall::{
     Calibration, Example, FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive, RecallConfig,
@@ -168,7 +168,7 @@ impl App {
 }
 
 /// A laser that the engine refuses, said of the field that the client sent.
-pub(super) fn invalid_geometry(error: locution_engine::config::ConfigError) -> AppError {
+pub(super) fn invalid_geometry(error: locution_engine::config_error::ConfigError) -> AppError {
     AppError::invalid(error.field, error.problem)
 }
 

@@ -2,7 +2,7 @@
 
 use locution_engine::formats::{GraphDocument, GrayImage, write_g2o};
 use locution_engine::geometry::Point2;
-use locution_engine::localization::{CellState, GridMap};
+use locution_engine::occupancy::{CellState, GridMap};
 use locution_engine::pose_graph::{InformationMatrix, PoseConstraint, PoseGraph};
 
 use super::maps::{MapRecord, PlacedRun};

@@ -2,8 +2,8 @@
 
 use std::sync::{Arc, PoisonError};
 
-use locution_engine::localization::GridMap;
-use locution_engine::mapping::{OccupancyConfig, TiledOccupancy};
+use locution_engine::occupancy::GridMap;
+use locution_engine::occupancy::{OccupancyConfig, TiledOccupancy};
 
 use super::maps::{MapRecord, PlacedRun};
 use super::site::Site;

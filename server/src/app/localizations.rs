@@ -11,9 +11,8 @@ use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
-use locution_engine::localization::{
-    CellState, DensityFieldConfig, GridMap, LocalizationState, Localizer, ServedMap,
-};
+use locution_engine::locate::{LocalizationState, Localizer, ServedMap};
+use locution_engine::occupancy::{CellState, GridMap};
 use locution_engine::recall::{Example, FoundPlace, PlaceIndex, RecentScans};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
@@ -328,9 +327,7 @@ impl App {
         let grid = self.grid(site, map, component).await?;
         let config = Arc::clone(&site.state().config);
         let served = on_blocking_thread(move || {
-            // Sessions weigh places by beam ends; one narrow kernel keeps the unused density field small.
-            let density = DensityFieldConfig { bandwidths_m: vec![1.5], ..DensityFieldConfig::default() };
-            ServedMap::build(halved(&grid), &density, &config.localization.likelihood_field)
+            ServedMap::build(halved(&grid), &config.localization.likelihood_field)
         })
         .await?;
         let served = Arc::new(served);

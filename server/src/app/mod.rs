@@ -11,7 +11,8 @@ use std::num::NonZeroUsize;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-use locution_engine::localization::{GridMap, ServedMap};
+use locution_engine::locate::ServedMap;
+use locution_engine::occupancy::GridMap;
 use lru::LruCache;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 

@@ -48,7 +48,7 @@ pub struct SiteState {
 impl SiteState {
     fn decode(bytes: Bytes) -> Result<Self, StorageError> {
         let record: SiteRecord = codec::decode(&bytes, "the record of the site")?;
-        let config = serde_json::from_str(&record.config_json).map_err(|error| StorageError::Corrupt {
+        let config = stored_config(&record.config_json).map_err(|error| StorageError::Corrupt {
             what: format!("the configuration of the site: {error}"),
         })?;
         Ok(Self { record, config: Arc::new(config), bytes })
@@ -67,6 +67,17 @@ impl SiteState {
         let quantizer = self.record.quantizer_json.as_ref().map(parse).transpose()?;
         Ok(TextConfig { engine: Arc::clone(&self.config), quantizer })
     }
+}
+
+/// A site's configuration as it was stored; sections that configured no part of the server, and that sites of older
+/// versions hold, are passed over.
+fn stored_config(json: &str) -> Result<EngineConfig, serde_json::Error> {
+    const RETIRED: [&str; 3] = ["density_field", "density_model", "particle_filter"];
+    let mut config: serde_json::Value = serde_json::from_str(json)?;
+    if let Some(localization) = config.get_mut("localization").and_then(serde_json::Value::as_object_mut) {
+        localization.retain(|section, _| !RETIRED.contains(&section.as_str()));
+    }
+    serde_json::from_value(config)
 }
 
 /// All that decides what text a run becomes.

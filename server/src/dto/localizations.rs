@@ -1,6 +1,6 @@
 //! Localisations and queries by example on the wire.
 
-use locution_engine::localization::LocalizationState;
+use locution_engine::locate::LocalizationState;
 use locution_engine::mapping::Direction;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;

@@ -1,7 +1,7 @@
 //! How a map becomes the bytes and words of its forms.
 
 use locution_engine::formats::GrayImage;
-use locution_engine::localization::{CellState, GridMap};
+use locution_engine::occupancy::{CellState, GridMap};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 

@@ -1,7 +1,0 @@
-//! The `locution` binary: arguments, configuration, logging, start; nothing else.
-
-use std::process::ExitCode;
-
-fn main() -> ExitCode {
-    locution_server::cli::run()
-}

@@ -1,0 +1,23 @@
+//! The laboratory: what measures the product or sets it beside the thesis. No robot needs any of it.
+//!
+//! - [`simulation`]: robots, people and lasers in drawn worlds, seeded
+//! - [`evaluation`]: the figures of the specification's reports, as pure functions
+//! - [`density_field`], [`particle_filter`]: Monte-Carlo localisation as the thesis has it (chapter 3)
+//! - [`thesis`]: its scenarios and tables
+//! - [`recordings`], [`worlds`], [`report`], [`plot`]: files in, tables and pictures out
+//!
+//! `examples/` holds programs that map recordings and worlds without a server, and a load generator.
+#![cfg_attr(test, allow(clippy::unwrap_used))]
+
+pub mod density_field;
+pub mod evaluation;
+pub mod particle_filter;
+pub mod plot;
+pub mod recordings;
+pub mod report;
+pub mod simulation;
+pub mod small_building;
+mod stroke_font;
+pub mod thesis;
+mod turns;
+pub mod worlds;
