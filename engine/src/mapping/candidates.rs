@@ -53,6 +53,19 @@ pub(crate) fn candidates_across(site: &SiteAnchors<'_>) -> Vec<Candidate> {
     found
 }
 
+/// Profile candidates within a run, at most one for a pair of anchors and a direction.
+pub(crate) fn candidates_within(site: &SiteAnchors<'_>, run: RunIdx) -> Vec<Candidate> {
+    let spacing_m = site.config.retrieval.sample_spacing_m;
+    let profile = RunProfile::from_observations(site.record(run).observations, spacing_m);
+    let index = ProfileIndex::build(vec![profile], site.config.retrieval.clone());
+    let named = index.all_candidates(0).into_iter().filter_map(|mut profile| {
+        profile.earlier.run_idx = run.at() as u32;
+        profile.later.run_idx = run.at() as u32;
+        to_anchors(site, (run, run), profile)
+    });
+    best_of_pair(named, site.config.max_candidates_per_pair)
+}
+
 impl Candidate {
     /// What it is about.
     pub fn key(&self) -> (AnchorIdx, AnchorIdx, Direction) {

@@ -75,6 +75,11 @@ impl<'a> CoarseGraph<'a> {
         self.graph.poses()[self.node(anchor)]
     }
 
+    /// Anchors of it with their poses.
+    pub fn placed(&self, anchors: &[AnchorIdx]) -> Vec<(AnchorIdx, Pose2)> {
+        anchors.iter().map(|&anchor| (anchor, self.pose(anchor))).collect()
+    }
+
     /// Node of an anchor of it.
     pub fn node(&self, anchor: AnchorIdx) -> usize {
         let run = self.site.run_of(anchor);

@@ -67,7 +67,8 @@ impl JoinEvidence {
         }
         let weakest = information.symmetric_eigenvalues().min();
         let mut opinions = Opinions::default();
-        let locals = overlap(graph, guest.graph.anchors(), host.graph.anchors());
+        let locals = overlap(graph.site, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()));
+        debug_locals(&locals, graph.site);
         for local in &locals {
             opinions += local.opinions;
         }
@@ -119,4 +120,27 @@ fn own_contradiction(component: &Component<'_>) -> f64 {
         all += component.graph.site.own_opinions(run);
     }
     all.all().contradiction()
+}
+
+// DEBUG
+pub(crate) fn debug_locals(locals: &[LocalOpinions], site: &super::site_anchors::SiteAnchors<'_>) {
+    if std::env::var_os("LOCUTION_DEBUG").is_some() {
+        let list: Vec<String> = locals
+            .iter()
+            .map(|local| {
+                let (a, b) = (local.opinions.of_later, local.opinions.of_earlier);
+                format!(
+                    "{}:{}:{:.1}:{}:{}:{}:{}",
+                    site.told(site.run_of(local.guest)),
+                    site.anchor(local.guest).keyframe.number(),
+                    local.nearest_m,
+                    a.num_confirmed,
+                    a.num_contradicted,
+                    b.num_confirmed,
+                    b.num_contradicted
+                )
+            })
+            .collect();
+        eprintln!("LOCAL {}", list.join(" "));
+    }
 }

@@ -52,6 +52,9 @@ pub(crate) fn join<'a>(
         .into_iter()
         .filter(|candidate| !workshop.judgements.forbid(candidate.earlier, candidate.later))
         .collect();
+    if std::env::var_os("LOCUTION_DEBUG").is_some() {
+        debug_own(&alone, workshop);
+    }
     let mut joiner = Joiner::new(alone, &candidates, workshop);
     let mut proposals = joiner.proposals(|_, _| true);
     while let Some(proposal) = proposals.pop() {
@@ -246,4 +249,37 @@ fn debug(both: &Component<'_>, host: &Component<'_>, guest: &Component<'_>, evid
         way.num_anchors,
         evidence
     );
+}
+
+// DEBUG
+fn debug_own(alone: &[Component<'_>], workshop: Workshop<'_>) {
+    let site = workshop.site;
+    for component in alone {
+        let run = component.graph.runs()[0];
+        let far: Vec<Candidate> = super::candidates::candidates_within(site, run)
+            .into_iter()
+            .filter(|candidate| {
+                component.graph.pose(candidate.earlier).distance(&component.graph.pose(candidate.later)) > 5.0
+            })
+            .collect();
+        let registered = Groups::new(component, component, &far).ways(component, workshop);
+        for way in registered.ways.iter().take(3) {
+            let hosts = component.graph.placed(component.graph.anchors());
+            let guests: Vec<_> =
+                hosts.iter().map(|(anchor, pose)| (*anchor, way.host_from_guest.compose(pose))).collect();
+            let locals = super::overlap::overlap(site, &guests, &hosts);
+            let mut all = crate::registration::Opinions::default();
+            locals.iter().for_each(|local| all += local.opinions);
+            eprintln!(
+                "OWN {} seeds {} overlapping {} later {:.4} earlier {:.4} own {:.4}",
+                site.told(run),
+                way.num_anchors,
+                locals.len(),
+                all.of_later.contradiction(),
+                all.of_earlier.contradiction(),
+                site.own_opinions(run).all().contradiction()
+            );
+            super::join_evidence::debug_locals(&locals, site);
+        }
+    }
 }

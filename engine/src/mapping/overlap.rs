@@ -5,8 +5,9 @@
 //! saw is compared as it lies, nothing is moved. How much contradiction a true overlap brings depends on the place:
 //! people, doors and glass make a run contradict itself, and that is what a join is measured by.
 
-use super::coarse_graph::CoarseGraph;
 use super::indices::AnchorIdx;
+use super::site_anchors::SiteAnchors;
+use crate::geometry::Pose2;
 use crate::registration::Opinions;
 
 /// Submaps whose anchors are farther apart have little in common, metres.
@@ -18,30 +19,32 @@ const MAX_HOSTS: usize = 4;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalOpinions {
     pub guest: AnchorIdx,
+    /// Distance to the nearest anchor of the host, metres.
+    pub nearest_m: f64,
     pub opinions: Opinions,
 }
 
-/// Compares every guest anchor that lies on the host with the host anchors nearest to it, at the graph's poses.
+/// Compares every guest anchor that lies on the host with the host anchors nearest to it, each where it is said to be.
 pub(crate) fn overlap(
-    graph: &CoarseGraph<'_>,
-    guests: &[AnchorIdx],
-    hosts: &[AnchorIdx],
+    site: &SiteAnchors<'_>,
+    guests: &[(AnchorIdx, Pose2)],
+    hosts: &[(AnchorIdx, Pose2)],
 ) -> Vec<LocalOpinions> {
     let mut found = Vec::new();
-    for &guest in guests {
-        let mut near: Vec<(f64, AnchorIdx)> = hosts
+    for (guest, guest_pose) in guests {
+        let mut near: Vec<(f64, AnchorIdx, &Pose2)> = hosts
             .iter()
-            .map(|&host| (graph.pose(host).distance(&graph.pose(guest)), host))
-            .filter(|(distance_m, _)| *distance_m < REACH_M)
+            .map(|(host, pose)| (pose.distance(guest_pose), *host, pose))
+            .filter(|(distance_m, ..)| *distance_m < REACH_M)
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut opinions = Opinions::default();
-        for &(_, host) in near.iter().take(MAX_HOSTS) {
-            let host_from_guest = graph.pose(host).between(&graph.pose(guest));
-            opinions += Opinions::of(graph.site.submap(host), graph.site.submap(guest), &host_from_guest);
+        for (_, host, host_pose) in near.iter().take(MAX_HOSTS) {
+            let host_from_guest = host_pose.between(guest_pose);
+            opinions += Opinions::of(site.submap(*host), site.submap(*guest), &host_from_guest);
         }
-        if !near.is_empty() {
-            found.push(LocalOpinions { guest, opinions });
+        if let Some((nearest_m, ..)) = near.first() {
+            found.push(LocalOpinions { guest: *guest, nearest_m: *nearest_m, opinions });
         }
     }
     found

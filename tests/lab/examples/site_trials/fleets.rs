@@ -34,8 +34,12 @@ pub struct FleetReport {
 
 pub fn mapped(runs: &[Driven]) -> Result<(SiteMap, f64), Failure> {
     let records: Vec<RunRecord<'_>> = runs.iter().map(Driven::record).collect();
+    let config: EngineConfig = match std::env::var("LOCUTION_CONFIG") {
+        Ok(text) => serde_json::from_str(&text)?,
+        Err(_) => EngineConfig::default(),
+    };
     let began = Instant::now();
-    let map = map_site(&EngineConfig::default().mapping, &records, &[], &mut RegistrationMemo::default())?;
+    let map = map_site(&config.mapping, &records, &[], &mut RegistrationMemo::default())?;
     Ok((map, began.elapsed().as_secs_f64()))
 }
 

@@ -7,7 +7,7 @@ mod order;
 use driven::Driven;
 use fleets::{FleetReport, judged, mapped};
 
-type Failure = Box<dyn std::error::Error + Send + Sync>;
+type Failure = anyhow::Error;
 
 const LENGTH_M: f64 = 150.0;
 const NUM_PEOPLE: usize = 2;
@@ -30,7 +30,7 @@ fn main() -> Result<(), Failure> {
             order::all_orders(&format!("{world} {first_seed}"), &runs)
         }
         ["growth", num_runs, world] => growth(num_runs.parse()?, world),
-        _ => Err("say `fleets FIRST_SEED NUM WORLD…` or `growth RUNS WORLD`".into()),
+        _ => Err(anyhow::anyhow!("say `fleets FIRST_SEED NUM WORLD…` or `growth RUNS WORLD`")),
     }
 }
 

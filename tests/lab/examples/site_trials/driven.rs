@@ -1,16 +1,17 @@
 //! Simulated robots, driven once and kept on disk: simulating and translating costs more than mapping.
 
-use std::io::Read;
 use std::path::PathBuf;
 
 use locution_engine::config::EngineConfig;
-use locution_engine::formats::{CarmenOptions, GrayImage, parse_map_server_yaml, read_carmen_log};
+use locution_engine::formats::CarmenOptions;
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{Keyframe, RunRecord};
 use locution_engine::scan::{Scan, ScanGeometry};
-use locution_engine::simulation::{PeopleConfig, SimulationConfig, Task, World, simulate_run};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::{Translation, Translator};
+use locution_lab::recordings::read_recording;
+use locution_lab::simulation::{PeopleConfig, SimulationConfig, Task, World, simulate_run};
+use locution_lab::worlds::read_world;
 use serde::{Deserialize, Serialize};
 
 use crate::Failure;
@@ -38,7 +39,7 @@ impl Driven {
         let people = PeopleConfig { num_people, ..PeopleConfig::default() };
         let config = SimulationConfig { people, ..SimulationConfig::default() };
         let task = Task::Wander { length_m, start: None };
-        let simulated = simulate_run(&read_world(world)?, &task, &config, seed)?;
+        let simulated = simulate_run(&self::world(world)?, &task, &config, seed)?;
         let mut run = Self::translated(world, simulated.geometry.clone(), &simulated.scans)?;
         let true_pose = |keyframe: &Keyframe| simulated.truth[keyframe.scan_seq as usize].truth_from_robot;
         run.truth = run.keyframes.iter().map(true_pose).collect();
@@ -52,11 +53,8 @@ impl Driven {
         if let Ok(bytes) = std::fs::read(&kept) {
             return Ok(postcard::from_bytes(&bytes)?);
         }
-        let file = std::fs::File::open(datasets().join("laser").join(format!("{name}.log.gz")))?;
-        let mut bytes = Vec::new();
-        flate2::read::MultiGzDecoder::new(file).read_to_end(&mut bytes)?;
-        let text = String::from_utf8_lossy(&bytes);
-        let log = read_carmen_log(text.lines(), &CarmenOptions::default())?;
+        let path = datasets().join("laser").join(format!("{name}.log.gz"));
+        let log = read_recording(&path, CarmenOptions::default())?.log;
         let run = Self::translated(name, log.geometry.clone(), &log.scans)?;
         std::fs::write(&kept, postcard::to_allocvec(&run)?)?;
         Ok(run)
@@ -115,22 +113,11 @@ fn cache_folder() -> Result<PathBuf, Failure> {
 /// Where the data sets are.
 pub fn datasets() -> PathBuf {
     std::env::var_os("LOCUTION_DATASETS").map_or_else(
-        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/datasets"),
+        || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/datasets"),
         PathBuf::from,
     )
 }
 
-fn read_world(name: &str) -> Result<World, Failure> {
-    let folder = datasets().join("worlds");
-    let yaml = parse_map_server_yaml(&std::fs::read_to_string(folder.join(format!("{name}.yaml")))?)?;
-    let mut decoder =
-        png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join(&yaml.image))?));
-    decoder.set_transformations(png::Transformations::EXPAND | png::Transformations::STRIP_16);
-    let mut reader = decoder.read_info()?;
-    let mut pixels = vec![0; reader.output_buffer_size().ok_or("the picture is too large")?];
-    let frame = reader.next_frame(&mut pixels)?;
-    let samples = frame.color_type.samples();
-    let pixels = pixels[..frame.buffer_size()].iter().step_by(samples).copied().collect();
-    let image = GrayImage { width: frame.width as usize, height: frame.height as usize, pixels };
-    Ok(World::from_map_server(&image, &yaml)?)
+fn world(name: &str) -> Result<World, Failure> {
+    Ok(read_world(&datasets().join("worlds").join(format!("{name}.yaml")))?)
 }
