@@ -2,7 +2,8 @@
 //! file and a function may grow. ARCHITECTURE.md gives the reasons.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+
+use locution_tidy::{Source, sources, workspace};
 
 /// Longest source file, in lines before its tests.
 const MAX_FILE_LINES: usize = 500;
@@ -31,54 +32,6 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("labelled", "labeled"),
     ("metre", "meter"),
 ];
-
-struct Source {
-    path: PathBuf,
-    text: String,
-}
-
-impl Source {
-    /// The part before the file's unit tests; nothing of a file that only tests compile.
-    fn code(&self) -> &str {
-        let name = self.path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
-        if name == "reference" || name == "testing" || name == "tests" || name.ends_with("_tests") {
-            return "";
-        }
-        self.text.split("#[cfg(test)]\nmod tests").next().unwrap_or_default()
-    }
-
-    /// Lines of code that are not comments.
-    fn statements(&self) -> impl Iterator<Item = (usize, &str)> {
-        self.code().lines().enumerate().filter(|(_, line)| !line.trim_start().starts_with("//"))
-    }
-
-    fn complaint(&self, line_idx: usize, problem: &str) -> String {
-        format!("{}:{}: {problem}", self.path.display(), line_idx + 1)
-    }
-}
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-fn sources(folder: &str) -> Vec<Source> {
-    let mut found = Vec::new();
-    let mut pending = vec![workspace().join(folder)];
-    while let Some(folder) = pending.pop() {
-        for entry in fs::read_dir(&folder).expect("the folder is part of the repository") {
-            let path = entry.expect("a readable folder entry").path();
-            if path.is_dir() {
-                pending.push(path);
-            } else if path.extension().is_some_and(|extension| extension == "rs") {
-                let text = fs::read_to_string(&path).expect("sources are UTF-8");
-                found.push(Source { path, text });
-            }
-        }
-    }
-    found.sort_by(|a, b| a.path.cmp(&b.path));
-    assert!(!found.is_empty(), "no source found in {folder}");
-    found
-}
 
 fn check(complaints: Vec<String>) {
     assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
@@ -164,7 +117,7 @@ fn names_are_spelled_in_one_way() {
     let mut complaints = Vec::new();
     for folder in ["engine", "server/src", "clients", "openapi", "tests"] {
         for source in sources(folder) {
-            for (line_idx, line) in source.text.lines().enumerate() {
+            for (line_idx, line) in source.statements() {
                 let code = line.split("//").next().unwrap_or_default();
                 let outside_strings: String =
                     code.split('"').step_by(2).collect::<Vec<_>>().join(" ").to_lowercase();
