@@ -30,11 +30,15 @@ pub(crate) struct Candidate {
 /// few places that each window has to give. Of every two runs the best `max_candidates_per_pair` are kept.
 pub(crate) fn candidates_across(site: &SiteAnchors<'_>) -> Vec<Candidate> {
     let spacing_m = site.config.retrieval.sample_spacing_m;
-    let profiles: Vec<RunProfile> =
-        site.runs().map(|run| RunProfile::from_observations(site.record(run).observations, spacing_m)).collect();
+    let profiles: Vec<RunProfile> = site
+        .runs()
+        .map(|run| RunProfile::from_observations(site.record(run).observations, spacing_m))
+        .collect();
     let pairs: Vec<(RunIdx, RunIdx)> = site
         .runs()
-        .flat_map(|later| site.runs().filter(move |&earlier| earlier < later).map(move |earlier| (earlier, later)))
+        .flat_map(|later| {
+            site.runs().filter(move |&earlier| earlier < later).map(move |earlier| (earlier, later))
+        })
         .collect();
     let of_pair = |&(earlier, later): &(RunIdx, RunIdx)| {
         let pair = vec![profiles[earlier.at()].clone(), profiles[later.at()].clone()];

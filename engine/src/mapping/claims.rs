@@ -24,7 +24,10 @@ impl<'a> ClosureIndex<'a> {
     /// All closures of a map.
     pub fn new(site: &'a SiteAnchors<'a>, components: &'a [Component<'a>]) -> Self {
         let of = |component: &'a Component<'a>| {
-            component.closures.iter().map(move |closure| ((closure.earlier, closure.later), (closure, component)))
+            component
+                .closures
+                .iter()
+                .map(move |closure| ((closure.earlier, closure.later), (closure, component)))
         };
         Self { site, closures: components.iter().flat_map(of).collect() }
     }
@@ -39,8 +42,7 @@ impl<'a> ClosureIndex<'a> {
         let (state, probability) = match best {
             Some((closure, component)) => {
                 let support = supporting.len() as f64;
-                let doubt =
-                    (1.0 - closure.fit.agreement) + 0.01 * component.graph.chi2(closure).min(20.0);
+                let doubt = (1.0 - closure.fit.agreement) + 0.01 * component.graph.chi2(closure).min(20.0);
                 (MatchState::Verified, (1.0 - 0.2 * doubt - 0.1 / (1.0 + support)).clamp(0.5, 1.0))
             }
             None => (MatchState::Candidate, 0.3),

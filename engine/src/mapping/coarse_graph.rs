@@ -98,7 +98,9 @@ impl<'a> CoarseGraph<'a> {
         for pose in self.graph.poses() {
             graph.add_pose(*pose)?;
         }
-        for pair in self.members.windows(2).filter(|pair| self.site.run_of(pair[0]) == self.site.run_of(pair[1])) {
+        for pair in
+            self.members.windows(2).filter(|pair| self.site.run_of(pair[0]) == self.site.run_of(pair[1]))
+        {
             let motion = self.site.step(pair[0], pair[1]);
             let covariance = self.site.step_covariance(pair[0]);
             graph.add_constraint(constraint(self.node(pair[0]), self.node(pair[1]), motion, covariance))?;

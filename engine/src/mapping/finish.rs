@@ -81,8 +81,7 @@ fn in_frame_of(component: &Component<'_>, first: RunIdx) -> Vec<(RunIdx, Vec<Pos
     let site = component.graph.site;
     let beginning = site.of_run(first).start;
     let began = AnchorIdx::new(beginning);
-    let map_from_graph =
-        site.anchor(began).run_from_anchor.compose(&component.graph.pose(began).inverse());
+    let map_from_graph = site.anchor(began).run_from_anchor.compose(&component.graph.pose(began).inverse());
     let placed = |&run: &RunIdx| {
         let pose_of = |anchor| map_from_graph.compose(&component.graph.pose(anchor));
         (run, spread_corrections(site, run, pose_of))

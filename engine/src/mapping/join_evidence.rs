@@ -10,6 +10,9 @@ use super::indices::AnchorIdx;
 use super::overlap::{LocalOpinions, overlap};
 use crate::registration::Opinions;
 
+/// Anchors this close lie beside each other, metres.
+pub(crate) const BESIDE_M: f64 = 2.0;
+
 /// How well a joined map holds between host and guest.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct JoinEvidence {
@@ -26,8 +29,8 @@ pub(crate) struct JoinEvidence {
     pub one_sided_contradiction: f64,
     /// The same over the worst ten metres or so.
     pub worst_stretch: f64,
-    /// Guest anchors that lie on the host.
-    pub num_overlapping: usize,
+    /// Guest anchors that lie beside one of the host.
+    pub num_beside: usize,
     pub of_later: f64,
     pub of_earlier: f64,
     /// Contradiction between places of one run, the worse of the two maps.
@@ -67,7 +70,8 @@ impl JoinEvidence {
         }
         let weakest = information.symmetric_eigenvalues().min();
         let mut opinions = Opinions::default();
-        let locals = overlap(graph.site, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()));
+        let locals =
+            overlap(graph.site, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()));
         debug_locals(&locals, graph.site);
         for local in &locals {
             opinions += local.opinions;
@@ -81,7 +85,7 @@ impl JoinEvidence {
             one_sided_contradiction: (opinions.of_later.contradiction())
                 .min(opinions.of_earlier.contradiction()),
             worst_stretch: worst_stretch(&locals),
-            num_overlapping: locals.len(),
+            num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
             of_later: opinions.of_later.contradiction(),
             of_earlier: opinions.of_earlier.contradiction(),
             own_contradiction: own_contradiction(guest).max(own_contradiction(host)),
@@ -95,6 +99,7 @@ impl JoinEvidence {
         self.num_anchors >= config.min_joining_anchors
             && self.share >= config.min_joining_share
             && self.worst_sd_m <= config.max_joining_sd_m
+            && self.worst_stretch <= config.max_stretch_contradiction
             && (self.one_sided_contradiction <= config.max_contradiction
                 || self.contradiction <= config.max_contradiction_ratio * self.own_contradiction)
     }

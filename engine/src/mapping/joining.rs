@@ -12,6 +12,7 @@ use super::coarse_graph::Closure;
 use super::component::{Component, Workshop};
 use super::indices::RunIdx;
 use super::join_evidence::JoinEvidence;
+use super::null::Null;
 use super::place_match::{Channel, PlaceMatch, RejectionReason};
 use super::refusals::{Refusal, unfit_matches};
 use super::ways::{Groups, Registered, Way};
@@ -52,10 +53,8 @@ pub(crate) fn join<'a>(
         .into_iter()
         .filter(|candidate| !workshop.judgements.forbid(candidate.earlier, candidate.later))
         .collect();
-    if std::env::var_os("LOCUTION_DEBUG").is_some() {
-        debug_own(&alone, workshop);
-    }
-    let mut joiner = Joiner::new(alone, &candidates, workshop);
+    let null = Null::of(&alone, workshop);
+    let mut joiner = Joiner::new(alone, &candidates, null, workshop);
     let mut proposals = joiner.proposals(|_, _| true);
     while let Some(proposal) = proposals.pop() {
         let (host, guest) = (proposal.host, proposal.guest);
@@ -63,8 +62,9 @@ pub(crate) fn join<'a>(
             continue;
         }
         // Every pair that one of the two belongs to is another question now.
-        let is_about_them =
-            |proposal: &Proposal<'_>| [proposal.host, proposal.guest].iter().any(|run| [host, guest].contains(run));
+        let is_about_them = |proposal: &Proposal<'_>| {
+            [proposal.host, proposal.guest].iter().any(|run| [host, guest].contains(run))
+        };
         proposals.retain(|proposal| !is_about_them(proposal));
         let joined = host.min(guest);
         proposals.extend(joiner.proposals(|a, b| a == joined || b == joined));
@@ -76,6 +76,7 @@ pub(crate) fn join<'a>(
 struct Joiner<'a, 'c> {
     workshop: Workshop<'a>,
     candidates: &'c [Candidate],
+    null: Null,
     /// By the first run of each.
     components: BTreeMap<RunIdx, Component<'a>>,
     /// Why two components were not joined, by their first runs.
@@ -86,11 +87,17 @@ struct Joiner<'a, 'c> {
 }
 
 impl<'a, 'c> Joiner<'a, 'c> {
-    fn new(alone: Vec<Component<'a>>, candidates: &'c [Candidate], workshop: Workshop<'a>) -> Self {
+    fn new(
+        alone: Vec<Component<'a>>,
+        candidates: &'c [Candidate],
+        null: Null,
+        workshop: Workshop<'a>,
+    ) -> Self {
         let components = alone.into_iter().map(|component| (component.graph.runs()[0], component)).collect();
         Self {
             workshop,
             candidates,
+            null,
             components,
             refusals: BTreeMap::new(),
             fits: Vec::new(),
@@ -103,7 +110,9 @@ impl<'a, 'c> Joiner<'a, 'c> {
     fn proposals(&self, is_wanted: impl Fn(RunIdx, RunIdx) -> bool + Sync) -> Vec<Proposal<'c>> {
         let firsts: Vec<RunIdx> = self.components.keys().copied().collect();
         let pairs: Vec<(RunIdx, RunIdx)> = (firsts.iter())
-            .flat_map(|&host| firsts.iter().filter(move |&&guest| host < guest).map(move |&guest| (host, guest)))
+            .flat_map(|&host| {
+                firsts.iter().filter(move |&&guest| host < guest).map(move |&guest| (host, guest))
+            })
             .filter(|&(host, guest)| is_wanted(host, guest))
             .collect();
         let proposal = |&(host, guest): &(RunIdx, RunIdx)| {
@@ -121,7 +130,7 @@ impl<'a, 'c> Joiner<'a, 'c> {
     fn try_join(&mut self, proposal: &Proposal<'c>) -> Result<bool, PoseGraphError> {
         let (host, guest) = (&self.components[&proposal.host], &self.components[&proposal.guest]);
         let registered = proposal.groups.ways(host, self.workshop);
-        let verdict = judged(&registered.ways, host, guest, self.workshop)?;
+        let verdict = judged(&registered.ways, host, guest, &self.null, self.workshop)?;
         let Registered { fits, unfit, .. } = registered;
         self.fits.extend(fits);
         self.unfit.extend(unfit.into_iter().map(|candidate| {
@@ -155,7 +164,10 @@ impl<'a, 'c> Joiner<'a, 'c> {
         }
         let first_of = |closure: &Closure| {
             let of = |anchor| {
-                self.components.iter().find(|(_, component)| component.graph.holds(anchor)).map(|(run, _)| *run)
+                self.components
+                    .iter()
+                    .find(|(_, component)| component.graph.holds(anchor))
+                    .map(|(run, _)| *run)
             };
             (of(closure.earlier), of(closure.later))
         };
@@ -163,8 +175,8 @@ impl<'a, 'c> Joiner<'a, 'c> {
         self.fits.dedup_by_key(|closure| (closure.later, closure.earlier));
         let refusal = |closure: &Closure| {
             let (Some(a), Some(b)) = first_of(closure) else { return None };
-            let is_refused = a != b
-                || self.components[&a].graph.chi2(closure) > self.workshop.site.config.max_chi2;
+            let is_refused =
+                a != b || self.components[&a].graph.chi2(closure) > self.workshop.site.config.max_chi2;
             let pair = (a.min(b), a.max(b));
             let reason = self.refusals.get(&pair).copied().unwrap_or(RejectionReason::Inconsistent);
             is_refused.then_some(Refusal { channel: Channel::Profile, closure: *closure, reason })
@@ -186,6 +198,7 @@ fn judged<'a>(
     ways: &[Way],
     host: &Component<'a>,
     guest: &Component<'a>,
+    null: &Null,
     workshop: Workshop<'a>,
 ) -> Result<Verdict<'a>, PoseGraphError> {
     let config = workshop.site.config;
@@ -195,11 +208,16 @@ fn judged<'a>(
         if let (Some((both, evidence)), true) = (&laid, std::env::var_os("LOCUTION_DEBUG").is_some()) {
             debug(both, host, guest, evidence, way);
         }
-        holding.extend(laid.filter(|(_, evidence)| evidence.holds(config)).map(|(both, evidence)| (evidence, both)));
+        holding.extend(
+            laid.filter(|(_, evidence)| evidence.holds(config)).map(|(both, evidence)| (evidence, both)),
+        );
     }
     holding.sort_by_key(|(evidence, _)| Reverse(evidence.num_anchors));
     let mut holding = holding.into_iter();
     let Some((best, both)) = holding.next() else { return Ok(Verdict::Apart(RejectionReason::Inconsistent)) };
+    if null.explains(&best, config) {
+        return Ok(Verdict::Apart(RejectionReason::Ambiguous));
+    }
     if best.is_vetoed {
         return Ok(Verdict::Apart(RejectionReason::Vetoed));
     }
@@ -224,7 +242,13 @@ fn differ(a: &Component<'_>, b: &Component<'_>, host: &Component<'_>, guest: &Co
 }
 
 // DEBUG
-fn debug(both: &Component<'_>, host: &Component<'_>, guest: &Component<'_>, evidence: &JoinEvidence, way: &Way) {
+fn debug(
+    both: &Component<'_>,
+    host: &Component<'_>,
+    guest: &Component<'_>,
+    evidence: &JoinEvidence,
+    way: &Way,
+) {
     let mut best = (f64::INFINITY, None);
     for &a in host.graph.anchors() {
         for &b in guest.graph.anchors() {
@@ -249,37 +273,4 @@ fn debug(both: &Component<'_>, host: &Component<'_>, guest: &Component<'_>, evid
         way.num_anchors,
         evidence
     );
-}
-
-// DEBUG
-fn debug_own(alone: &[Component<'_>], workshop: Workshop<'_>) {
-    let site = workshop.site;
-    for component in alone {
-        let run = component.graph.runs()[0];
-        let far: Vec<Candidate> = super::candidates::candidates_within(site, run)
-            .into_iter()
-            .filter(|candidate| {
-                component.graph.pose(candidate.earlier).distance(&component.graph.pose(candidate.later)) > 5.0
-            })
-            .collect();
-        let registered = Groups::new(component, component, &far).ways(component, workshop);
-        for way in registered.ways.iter().take(3) {
-            let hosts = component.graph.placed(component.graph.anchors());
-            let guests: Vec<_> =
-                hosts.iter().map(|(anchor, pose)| (*anchor, way.host_from_guest.compose(pose))).collect();
-            let locals = super::overlap::overlap(site, &guests, &hosts);
-            let mut all = crate::registration::Opinions::default();
-            locals.iter().for_each(|local| all += local.opinions);
-            eprintln!(
-                "OWN {} seeds {} overlapping {} later {:.4} earlier {:.4} own {:.4}",
-                site.told(run),
-                way.num_anchors,
-                locals.len(),
-                all.of_later.contradiction(),
-                all.of_earlier.contradiction(),
-                site.own_opinions(run).all().contradiction()
-            );
-            super::join_evidence::debug_locals(&locals, site);
-        }
-    }
 }

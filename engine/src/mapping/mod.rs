@@ -14,6 +14,7 @@ mod joining;
 mod judgements;
 mod mapper;
 mod memo;
+mod null;
 mod overlap;
 mod place_match;
 mod placement;

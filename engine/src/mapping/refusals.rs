@@ -3,9 +3,9 @@
 
 use super::candidates::Candidate;
 use super::coarse_graph::Closure;
+use super::indices::RunIdx;
 use super::place_match::{Channel, Evidence, MatchState, PlaceMatch, RejectionReason};
 use super::site_anchors::SiteAnchors;
-use super::indices::RunIdx;
 use crate::retrieval::ProfileCandidate;
 use crate::text::Interval;
 
@@ -99,7 +99,8 @@ mod tests {
     #[test]
     fn the_best_of_each_pair_of_places_is_listed() {
         let candidates = [candidate(0, 2.0), candidate(40, 3.0), candidate(500, 1.0)];
-        let firsts: Vec<u32> = best_apart(candidates.iter()).iter().map(|found| found.earlier.first).collect();
+        let firsts: Vec<u32> =
+            best_apart(candidates.iter()).iter().map(|found| found.earlier.first).collect();
         assert_eq!(firsts, [40, 500]);
     }
 

@@ -132,7 +132,8 @@ impl<'a> SiteAnchors<'a> {
         self.submaps[anchor.at()].get_or_init(|| {
             let Anchor { run, keyframe, .. } = self.anchors[anchor.at()];
             let run = run.at();
-            let used = surroundings(self.runs[run].keyframes, &self.travels_m[run], keyframe.at(), self.config);
+            let used =
+                surroundings(self.runs[run].keyframes, &self.travels_m[run], keyframe.at(), self.config);
             let scans: Vec<SubmapScan<'_>> = used
                 .iter()
                 .map(|keyframe| SubmapScan {

@@ -66,7 +66,8 @@ pub fn judged(name: &str, runs: &[Driven], map: &SiteMap, seconds: f64) -> Fleet
                 }
             }
             if is_joined {
-                let error_m = if a.place == b.place { misplaced_m(runs, map, earlier, later) } else { f64::INFINITY };
+                let error_m =
+                    if a.place == b.place { misplaced_m(runs, map, earlier, later) } else { f64::INFINITY };
                 if error_m > FALSE_M {
                     report.false_joins.push((earlier, later, error_m));
                 }
@@ -106,7 +107,8 @@ fn misplaced_m(runs: &[Driven], map: &SiteMap, first: usize, second: usize) -> f
 /// The rigid motion that lays poses best over the truth.
 pub fn world_from_map(truth: &[Pose2], poses: &[Pose2]) -> Pose2 {
     let num = poses.len() as f64;
-    let mean = |of: &[Pose2]| of.iter().fold((0.0, 0.0), |sum, pose| (sum.0 + pose.x / num, sum.1 + pose.y / num));
+    let mean =
+        |of: &[Pose2]| of.iter().fold((0.0, 0.0), |sum, pose| (sum.0 + pose.x / num, sum.1 + pose.y / num));
     let (from, to) = (mean(poses), mean(truth));
     let (mut sin, mut cos) = (0.0, 0.0);
     for (pose, truth) in poses.iter().zip(truth) {

@@ -71,11 +71,16 @@ fn growth(num_runs: u64, world: &str) -> Result<(), Failure> {
             let world = if run % 2 == 0 { world.to_owned() } else { format!("{world}-furniture") };
             let mut run = Driven::wandering(&world, 80.0, 3, 500 + run)?;
             run.place = "same".to_owned();
-            Ok(run)
+            Ok::<_, Failure>(run)
         })
         .collect::<Result<Vec<_>, Failure>>()?;
     let (map, seconds) = mapped(&runs)?;
     let report = judged(&format!("{world} growth {num_runs}"), &runs, &map, seconds);
-    println!("{} matches, {} refused, {}", map.matches.len(), map.refused.len(), serde_json::to_string(&report)?);
+    println!(
+        "{} matches, {} refused, {}",
+        map.matches.len(),
+        map.refused.len(),
+        serde_json::to_string(&report)?
+    );
     Ok(())
 }

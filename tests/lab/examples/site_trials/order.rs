@@ -22,9 +22,7 @@ pub fn all_orders(name: &str, runs: &[Driven]) -> Result<(), Failure> {
         num_orders += 1;
         match &first {
             Some(first) => {
-                let same = |a: usize, b: usize| {
-                    (first[a].0 == first[b].0) == (placed[a].0 == placed[b].0)
-                };
+                let same = |a: usize, b: usize| (first[a].0 == first[b].0) == (placed[a].0 == placed[b].0);
                 let is_same = (0..runs.len()).all(|a| (0..a).all(|b| same(a, b)));
                 num_other += u32::from(!is_same);
                 worst_m = worst_m.max(differ_m(first, &placed));
@@ -32,7 +30,9 @@ pub fn all_orders(name: &str, runs: &[Driven]) -> Result<(), Failure> {
             None => first = Some(placed),
         }
     }
-    println!("{name}: {num_orders} orders, {num_other} with other components than the first, poses differ by at most {worst_m:.4} m");
+    println!(
+        "{name}: {num_orders} orders, {num_other} with other components than the first, poses differ by at most {worst_m:.4} m"
+    );
     Ok(())
 }
 
