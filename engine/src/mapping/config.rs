@@ -84,16 +84,10 @@ pub struct MappingConfig {
     /// Share of the returns of one map that another may contradict where they overlap, in the direction in which it is
     /// less: furniture that came or went shows in one direction only, another building in both.
     pub max_contradiction: f64,
-    /// The same over any ten metres of the overlap.
-    pub max_stretch_contradiction: f64,
-    /// A wrong way to lay a run over itself that reaches this multiple of the join, and is contradicted no more than
-    /// `null_slack` times as much, forbids it.
+    /// A wrong way to lay a run over itself forbids a join when it reaches at least this share of the join's length …
     pub min_reach_over_null: f64,
-    /// See `min_reach_over_null`.
+    /// … and is contradicted at most this many times as much.
     pub null_slack: f64,
-    /// Two maps may also be joined when they contradict each other, both directions together, no more than this
-    /// multiple of the share in which their own runs contradict themselves.
-    pub max_contradiction_ratio: f64,
 }
 
 impl Default for MappingConfig {
@@ -136,14 +130,12 @@ impl Default for MappingConfig {
             max_ambiguity: 0.7,
             max_candidates_per_pair: 600,
             min_seeds: 2,
-            max_ways: 8,
-            max_probes: 10,
-            max_hypotheses: 3,
-            max_contradiction: 0.04,
-            max_stretch_contradiction: 1.0,
-            min_reach_over_null: 1.0,
-            null_slack: 1.5,
-            max_contradiction_ratio: 1.4,
+            max_ways: 12,
+            max_probes: 12,
+            max_hypotheses: 5,
+            max_contradiction: 0.05,
+            min_reach_over_null: 0.8,
+            null_slack: 1.2,
         }
     }
 }

@@ -181,14 +181,11 @@ fn support(site: &SiteAnchors<'_>, closure: &Closure, all: &[Closure]) -> usize 
 
 /// True when going round the loop of two closures and the odometry between them comes back to the start.
 fn agrees(site: &SiteAnchors<'_>, a: &Closure, b: &Closure) -> bool {
-    let steps = (site.step(a.earlier, b.earlier), site.step(a.later, b.later));
-    closes(&a.fit.earlier_from_later, &b.fit.earlier_from_later, &steps)
-}
-
-/// True when two relative poses and the ways between their ends make a loop that closes, as nearly as such ways can be
-/// known.
-pub(crate) fn closes(a: &Pose2, b: &Pose2, (earlier_step, later_step): &(Pose2, Pose2)) -> bool {
-    let error = a.compose(later_step).between(&earlier_step.compose(b));
+    let earlier_step = site.step(a.earlier, b.earlier);
+    let later_step = site.step(a.later, b.later);
+    let one_way = a.fit.earlier_from_later.compose(&later_step);
+    let other_way = earlier_step.compose(&b.fit.earlier_from_later);
+    let error = one_way.between(&other_way);
     let length_m = earlier_step.x.hypot(earlier_step.y) + later_step.x.hypot(later_step.y);
     error.x.hypot(error.y) < 0.3 + 0.03 * length_m && error.theta.abs() < 0.06 + 0.004 * length_m
 }

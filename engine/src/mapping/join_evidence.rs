@@ -7,7 +7,7 @@ use nalgebra::Matrix2;
 use super::component::{Component, Workshop};
 use super::config::MappingConfig;
 use super::indices::AnchorIdx;
-use super::overlap::{LocalOpinions, overlap};
+use super::overlap::overlap;
 use crate::registration::Opinions;
 
 /// Anchors this close lie beside each other, metres.
@@ -22,20 +22,11 @@ pub(crate) struct JoinEvidence {
     pub share: f64,
     /// Standard deviation of the worst direction, metres.
     pub worst_sd_m: f64,
-    /// Share of the returns of the two that contradict each other wherever they overlap.
-    pub contradiction: f64,
-    /// The share that the one contradicts of what the other saw, whichever way is less: furniture that came or went
-    /// counts only one way.
+    /// The share of the returns that the one contradicts of what the other saw wherever they overlap, whichever way is
+    /// less: furniture that came or went counts only one way.
     pub one_sided_contradiction: f64,
-    /// The same over the worst ten metres or so.
-    pub worst_stretch: f64,
     /// Guest anchors that lie beside one of the host.
     pub num_beside: usize,
-    pub of_later: f64,
-    pub of_earlier: f64,
-    /// Contradiction between places of one run, the worse of the two maps.
-    pub own_contradiction: f64,
-    pub own_least: f64,
     /// True when the joined map brings together what a person said are different places.
     pub is_vetoed: bool,
 }
@@ -72,7 +63,6 @@ impl JoinEvidence {
         let mut opinions = Opinions::default();
         let locals =
             overlap(graph.site, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()));
-        debug_locals(&locals, graph.site);
         for local in &locals {
             opinions += local.opinions;
         }
@@ -81,15 +71,9 @@ impl JoinEvidence {
             num_anchors: anchors.len(),
             share: tried.intersection(&anchors).count() as f64 / tried.len().max(1) as f64,
             worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
-            contradiction: opinions.all().contradiction(),
             one_sided_contradiction: (opinions.of_later.contradiction())
                 .min(opinions.of_earlier.contradiction()),
-            worst_stretch: worst_stretch(&locals),
             num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
-            of_later: opinions.of_later.contradiction(),
-            of_earlier: opinions.of_earlier.contradiction(),
-            own_contradiction: own_contradiction(guest).max(own_contradiction(host)),
-            own_least: own_contradiction(guest).min(own_contradiction(host)),
             is_vetoed: workshop.judgements.contradict(graph, near_m, |anchor| guest.graph.holds(anchor)),
         }
     }
@@ -99,53 +83,6 @@ impl JoinEvidence {
         self.num_anchors >= config.min_joining_anchors
             && self.share >= config.min_joining_share
             && self.worst_sd_m <= config.max_joining_sd_m
-            && self.worst_stretch <= config.max_stretch_contradiction
-            && (self.one_sided_contradiction <= config.max_contradiction
-                || self.contradiction <= config.max_contradiction_ratio * self.own_contradiction)
-    }
-}
-
-/// Anchors of a stretch: about ten metres.
-const STRETCH: usize = 5;
-
-/// The contradiction of the stretch of the guest's drive where it is largest, in the direction in which it is less.
-fn worst_stretch(locals: &[LocalOpinions]) -> f64 {
-    let stretches = locals.windows(STRETCH.min(locals.len()).max(1));
-    stretches.fold(0.0, |worst, stretch| {
-        let mut opinions = Opinions::default();
-        stretch.iter().for_each(|local| opinions += local.opinions);
-        worst.max(opinions.of_later.contradiction().min(opinions.of_earlier.contradiction()))
-    })
-}
-
-/// How much the runs of a component contradict themselves.
-fn own_contradiction(component: &Component<'_>) -> f64 {
-    let mut all = Opinions::default();
-    for &run in component.graph.runs() {
-        all += component.graph.site.own_opinions(run);
-    }
-    all.all().contradiction()
-}
-
-// DEBUG
-pub(crate) fn debug_locals(locals: &[LocalOpinions], site: &super::site_anchors::SiteAnchors<'_>) {
-    if std::env::var_os("LOCUTION_DEBUG").is_some() {
-        let list: Vec<String> = locals
-            .iter()
-            .map(|local| {
-                let (a, b) = (local.opinions.of_later, local.opinions.of_earlier);
-                format!(
-                    "{}:{}:{:.1}:{}:{}:{}:{}",
-                    site.told(site.run_of(local.guest)),
-                    site.anchor(local.guest).keyframe.number(),
-                    local.nearest_m,
-                    a.num_confirmed,
-                    a.num_contradicted,
-                    b.num_confirmed,
-                    b.num_contradicted
-                )
-            })
-            .collect();
-        eprintln!("LOCAL {}", list.join(" "));
+            && self.one_sided_contradiction <= config.max_contradiction
     }
 }

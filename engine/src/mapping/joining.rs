@@ -129,7 +129,7 @@ impl<'a, 'c> Joiner<'a, 'c> {
     /// stays as it was.
     fn try_join(&mut self, proposal: &Proposal<'c>) -> Result<bool, PoseGraphError> {
         let (host, guest) = (&self.components[&proposal.host], &self.components[&proposal.guest]);
-        let registered = proposal.groups.ways(host, self.workshop);
+        let registered = proposal.groups.ways(self.workshop);
         let verdict = judged(&registered.ways, host, guest, &self.null, self.workshop)?;
         let Registered { fits, unfit, .. } = registered;
         self.fits.extend(fits);
@@ -205,9 +205,6 @@ fn judged<'a>(
     let mut holding: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
     for way in ways.iter().take(config.max_hypotheses) {
         let laid = Component::laid_over(host, guest, way, workshop)?;
-        if let (Some((both, evidence)), true) = (&laid, std::env::var_os("LOCUTION_DEBUG").is_some()) {
-            debug(both, host, guest, evidence, way);
-        }
         holding.extend(
             laid.filter(|(_, evidence)| evidence.holds(config)).map(|(both, evidence)| (evidence, both)),
         );
@@ -239,38 +236,4 @@ fn differ(a: &Component<'_>, b: &Component<'_>, host: &Component<'_>, guest: &Co
     let relative = |both: &Component<'_>| both.graph.pose(host).between(&both.graph.pose(guest));
     let difference = relative(a).between(&relative(b));
     difference.x.hypot(difference.y) > 1.0 || difference.theta.abs() > 0.2
-}
-
-// DEBUG
-fn debug(
-    both: &Component<'_>,
-    host: &Component<'_>,
-    guest: &Component<'_>,
-    evidence: &JoinEvidence,
-    way: &Way,
-) {
-    let mut best = (f64::INFINITY, None);
-    for &a in host.graph.anchors() {
-        for &b in guest.graph.anchors() {
-            let d = both.graph.pose(a).distance(&both.graph.pose(b));
-            if d < best.0 {
-                best = (d, Some((a, b)));
-            }
-        }
-    }
-    let Some((a, b)) = best.1 else { return };
-    let site = both.graph.site;
-    let rel = both.graph.pose(a).between(&both.graph.pose(b));
-    eprintln!(
-        "JOIN {} {} {} {} {:.3} {:.3} {:.4} {} {:?}",
-        site.told(site.run_of(a)),
-        site.anchor(a).keyframe.number(),
-        site.told(site.run_of(b)),
-        site.anchor(b).keyframe.number(),
-        rel.x,
-        rel.y,
-        rel.theta,
-        way.num_anchors,
-        evidence
-    );
 }

@@ -60,7 +60,7 @@ fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Vec<WrongWay
     }
     let apart_m = site.config.neighbor_distance_m;
     candidates.retain(|found| graph.pose(found.earlier).distance(&graph.pose(found.later)) > apart_m);
-    let registered = Groups::new(component, component, &candidates).ways(component, workshop);
+    let registered = Groups::new(component, component, &candidates).ways(workshop);
     registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way)).collect()
 }
 
@@ -73,18 +73,6 @@ fn wrong_way(component: &Component<'_>, way: &Way) -> WrongWay {
     let locals = overlap(site, &guests, &hosts);
     let mut opinions = Opinions::default();
     locals.iter().for_each(|local| opinions += local.opinions);
-    if std::env::var_os("LOCUTION_DEBUG").is_some() {
-        eprintln!(
-            "OWN {} seeds {} beside {} later {:.4} earlier {:.4} own {:.4}",
-            site.told(component.graph.runs()[0]),
-            way.num_anchors,
-            locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
-            opinions.of_later.contradiction(),
-            opinions.of_earlier.contradiction(),
-            site.own_opinions(component.graph.runs()[0]).all().contradiction()
-        );
-        super::join_evidence::debug_locals(&locals, site);
-    }
     WrongWay {
         num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
         one_sided_contradiction: opinions.of_later.contradiction().min(opinions.of_earlier.contradiction()),

@@ -18,7 +18,6 @@ const MAX_HOSTS: usize = 4;
 /// What one anchor of the guest and the host around it say of each other.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocalOpinions {
-    pub guest: AnchorIdx,
     /// Distance to the nearest anchor of the host, metres.
     pub nearest_m: f64,
     pub opinions: Opinions,
@@ -44,7 +43,7 @@ pub(crate) fn overlap(
             opinions += Opinions::of(site.submap(*host), site.submap(*guest), &host_from_guest);
         }
         if let Some((nearest_m, ..)) = near.first() {
-            found.push(LocalOpinions { guest: *guest, nearest_m: *nearest_m, opinions });
+            found.push(LocalOpinions { nearest_m: *nearest_m, opinions });
         }
     }
     found

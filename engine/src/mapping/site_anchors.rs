@@ -10,7 +10,7 @@ use super::config::MappingConfig;
 use super::indices::{AnchorIdx, KeyframeIdx, RunIdx};
 use super::run::{Keyframe, RunRecord};
 use crate::geometry::Pose2;
-use crate::registration::{Opinions, Submap, SubmapScan};
+use crate::registration::{Submap, SubmapScan};
 use crate::text::Interval;
 
 /// A keyframe that stands for its neighborhood; a node of the coarse graph.
@@ -42,7 +42,6 @@ pub(crate) struct SiteAnchors<'a> {
     steps: Vec<Matrix3<f64>>,
     /// Made when they are first looked at: most pairs are known from earlier builds.
     submaps: Vec<OnceLock<Submap>>,
-    own_opinions: Vec<OnceLock<Opinions>>,
     /// For each run where its anchors begin; one more entry than runs.
     starts: Vec<usize>,
     /// For each run the travel at each keyframe, metres.
@@ -83,8 +82,7 @@ impl<'a> SiteAnchors<'a> {
         let anchors: Vec<Anchor> = chosen.par_iter().map(anchor).collect();
         let steps = (0..anchors.len()).map(|from| step_covariance(&anchors, from, &runs, config)).collect();
         let submaps = anchors.iter().map(|_| OnceLock::new()).collect();
-        let own_opinions = runs.iter().map(|_| OnceLock::new()).collect();
-        Self { config, runs, told, anchors, steps, submaps, own_opinions, starts, travels_m }
+        Self { config, runs, told, anchors, steps, submaps, starts, travels_m }
     }
 
     /// All runs.
@@ -143,24 +141,6 @@ impl<'a> SiteAnchors<'a> {
                 .collect();
             let anchor_pose = self.anchors[anchor.at()].run_from_anchor;
             Submap::new(self.runs[run].geometry, &scans, &anchor_pose, &self.config.submap)
-        })
-    }
-
-    /// What the places of a run say of those a little later, which were seen by other scans.
-    pub fn own_opinions(&self, run: RunIdx) -> Opinions {
-        *self.own_opinions[run.at()].get_or_init(|| {
-            let range = self.of_run(run);
-            let mut all = Opinions::default();
-            for from in range.clone().map(AnchorIdx::new) {
-                let apart_m = self.anchor(from).travel_m + 2.0 * self.config.submap_half_length_m;
-                let after = self.anchors[range.clone()].partition_point(|anchor| anchor.travel_m < apart_m);
-                if range.start + after >= range.end {
-                    break;
-                }
-                let to = AnchorIdx::new(range.start + after);
-                all += Opinions::of(self.submap(from), self.submap(to), &self.step(from, to));
-            }
-            all
         })
     }
 

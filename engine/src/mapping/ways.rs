@@ -8,14 +8,16 @@
 use std::cmp::Reverse;
 use std::collections::BTreeSet;
 
+use nalgebra::{Matrix3, Vector3};
+
 use super::candidates::Candidate;
-use super::coarse_graph::Closure;
+use super::coarse_graph::{Closure, deviation2, slack};
 use super::component::{Component, Workshop};
-use super::guided::{closes, is_fit};
+use super::guided::is_fit;
 use super::indices::AnchorIdx;
 use super::memo::Request;
 use crate::geometry::Pose2;
-use crate::registration::SearchWindow;
+use crate::registration::{SearchWindow, SubmapFit, rotated};
 
 /// A way to lay one component over another.
 #[derive(Clone, Debug)]
@@ -40,6 +42,51 @@ struct Claim<'c> {
     /// The guest's anchor seen from the host's.
     relative: Pose2,
 }
+
+/// A claim that registration bears out.
+#[derive(Clone, Copy, Debug)]
+struct Fit<'c> {
+    claim: Claim<'c>,
+    closure: Closure,
+    /// Covariance of the claim's relative pose, in the axes of the host's anchor.
+    covariance: Matrix3<f64>,
+}
+
+impl<'c> Fit<'c> {
+    fn new(claim: &Claim<'c>, fit: SubmapFit) -> Self {
+        let (earlier, later) = (claim.candidate.earlier, claim.candidate.later);
+        let seen = fit.earlier_from_later;
+        let (relative, covariance) = match claim.host == earlier {
+            true => (seen, fit.covariance),
+            // The lever of the heading matters little nearby.
+            false => (seen.inverse(), rotated(&fit.covariance, -seen.theta)),
+        };
+        Self { claim: Claim { relative, ..*claim }, closure: Closure { earlier, later, fit }, covariance }
+    }
+
+    /// True when both lay the components over each other in one way, as far as each is sure: a fit in a plain corridor
+    /// may slide along it.
+    fn agrees(&self, other: &Self, chi2_max: f64) -> bool {
+        let host_step = self.claim.host_pose.between(&other.claim.host_pose);
+        let guest_step = self.claim.guest_pose.between(&other.claim.guest_pose);
+        let one_way = self.claim.relative.compose(&guest_step);
+        let other_way = host_step.compose(&other.claim.relative);
+        let (host_m, guest_m) = (host_step.x.hypot(host_step.y), guest_step.x.hypot(guest_step.y));
+        let drift_m = DRIFT * (host_m + guest_m);
+        let drift_rad = DRIFT_RAD_PER_M * (host_m + guest_m);
+        let lever_m2 = guest_m * guest_m * self.covariance[(2, 2)] + drift_m * drift_m;
+        let covariance = self.covariance
+            + rotated(&other.covariance, host_step.theta)
+            + slack()
+            + Matrix3::from_diagonal(&Vector3::new(lever_m2, lever_m2, drift_rad * drift_rad));
+        deviation2(&one_way, &other_way, &covariance) <= chi2_max
+    }
+}
+
+/// How much further apart two places of a settled component may be than it says, as a share of their distance.
+const DRIFT: f64 = 0.015;
+/// The same for headings, radians per metre.
+const DRIFT_RAD_PER_M: f64 = 0.002;
 
 impl<'c> Claim<'c> {
     fn new(host: &Component<'_>, guest: &Component<'_>, candidate: &'c Candidate) -> Option<Self> {
@@ -67,10 +114,10 @@ impl<'c> Claim<'c> {
     }
 }
 
-/// How many groups of candidates the runs of two components have at most, and how many of each are registered.
+/// Candidates between two components that are sorted into groups, those that read most alike.
 const NUM_SEEDS_MAX: usize = 400;
 
-/// The size of the largest group of candidates between two components: a bound of what a join could rest on.
+/// Candidates between two components, in groups that agree.
 pub(crate) struct Groups<'c> {
     groups: Vec<Vec<Claim<'c>>>,
 }
@@ -119,28 +166,23 @@ impl<'c> Groups<'c> {
 
     /// Registers a few members of every group, and returns the ways that these bear out, those with most anchors
     /// first, with the fits of all and the candidates that do not fit.
-    pub fn ways(&self, host: &Component<'_>, workshop: Workshop<'_>) -> Registered<'c> {
+    pub fn ways(&self, workshop: Workshop<'_>) -> Registered<'c> {
         let config = workshop.site.config;
         let mut found = Registered::default();
         for group in &self.groups {
             let chosen = spread_out(group, config.max_probes);
             let requests: Vec<Request> = chosen.iter().map(|claim| request(claim.candidate)).collect();
             let fits = workshop.memo.answers(&requests, workshop.site);
-            let mut claims = Vec::new();
+            let mut fitting = Vec::new();
             for (claim, fit) in chosen.iter().zip(fits) {
                 match fit.filter(|fit| is_fit(fit, config)) {
-                    Some(fit) => {
-                        let (earlier, later) = (claim.candidate.earlier, claim.candidate.later);
-                        let is_told_so = host.graph.holds(earlier);
-                        let seen = fit.earlier_from_later;
-                        let relative = if is_told_so { seen } else { seen.inverse() };
-                        claims.push((Claim { relative, ..*claim }, Closure { earlier, later, fit }));
-                    }
+                    Some(fit) => fitting.push(Fit::new(claim, fit)),
                     None => found.unfit.push(claim.candidate),
                 }
             }
-            found.fits.extend(claims.iter().map(|(_, closure)| *closure));
-            found.ways.extend(way(&claims).filter(|way| way.num_anchors >= config.min_seeds));
+            found.fits.extend(fitting.iter().map(|fit| fit.closure));
+            let way = way(&fitting, config.consistency.cycle_chi2_max);
+            found.ways.extend(way.filter(|way| way.num_anchors >= config.min_seeds));
         }
         found.ways.sort_by_key(|way| Reverse(way.num_anchors));
         found
@@ -171,27 +213,17 @@ fn spread_out<'c>(group: &[Claim<'c>], num_max: usize) -> Vec<Claim<'c>> {
 }
 
 /// The largest set of fits that agree with one of them.
-fn way(fits: &[(Claim<'_>, Closure)]) -> Option<Way> {
-    let seed = (0..fits.len()).max_by_key(|&seed| (agreeing(fits, &fits[seed].0).len(), Reverse(seed)))?;
-    let members = agreeing(fits, &fits[seed].0);
-    let doubt = |closure: &Closure| closure.fit.covariance.fixed_view::<2, 2>(0, 0).trace();
-    let (surest, _) = members.iter().min_by(|a, b| doubt(&a.1).total_cmp(&doubt(&b.1)))?;
-    let hosts: BTreeSet<AnchorIdx> = members.iter().map(|(claim, _)| claim.host).collect();
-    let guests: BTreeSet<AnchorIdx> = members.iter().map(|(claim, _)| claim.guest).collect();
+fn way(fits: &[Fit<'_>], chi2_max: f64) -> Option<Way> {
+    let agreeing = |seed: usize| fits.iter().filter(move |fit| fits[seed].agrees(fit, chi2_max));
+    let seed = (0..fits.len()).max_by_key(|&seed| (agreeing(seed).count(), Reverse(seed)))?;
+    let members: Vec<&Fit<'_>> = agreeing(seed).collect();
+    let doubt = |fit: &Fit<'_>| fit.covariance.fixed_view::<2, 2>(0, 0).trace();
+    let surest = members.iter().min_by(|a, b| doubt(a).total_cmp(&doubt(b)))?.claim;
+    let hosts: BTreeSet<AnchorIdx> = members.iter().map(|fit| fit.claim.host).collect();
+    let guests: BTreeSet<AnchorIdx> = members.iter().map(|fit| fit.claim.guest).collect();
     Some(Way {
         host_from_guest: surest.host_pose.compose(&surest.relative).compose(&surest.guest_pose.inverse()),
-        closures: members.iter().map(|(_, closure)| *closure).collect(),
+        closures: members.iter().map(|fit| fit.closure).collect(),
         num_anchors: hosts.len().min(guests.len()),
     })
-}
-
-/// The fits that lay the two components over each other as one of them does.
-fn agreeing<'f, 'c>(fits: &'f [(Claim<'c>, Closure)], seed: &Claim<'c>) -> Vec<&'f (Claim<'c>, Closure)> {
-    let is_member = |fit: &&'f (Claim<'c>, Closure)| {
-        let (claim, _) = fit;
-        let host_step = seed.host_pose.between(&claim.host_pose);
-        let guest_step = seed.guest_pose.between(&claim.guest_pose);
-        closes(&seed.relative, &claim.relative, &(host_step, guest_step))
-    };
-    fits.iter().filter(is_member).collect()
 }
