@@ -6,8 +6,8 @@
 //!
 //! Read the rooms in the order of the data flow:
 //! [`scan`] → [`sampling`], [`grid`] → [`density`] → [`text`] (joined by the [`translator`]) → [`index`] →
-//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`]; beside it [`occupancy`], what is drawn
-//! of a map, [`locate`], [`recall`] and [`semantics`], which read it, and [`formats`].
+//! [`matching`], [`retrieval`] → [`registration`] → [`pose_graph`] → [`mapping`] → [`recording`], where a run
+//! was driven in a map; beside it [`occupancy`], what is drawn of a map, [`locate`], [`recall`] and [`semantics`], which read it, and [`formats`].
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
@@ -24,6 +24,7 @@ pub mod matching;
 pub mod occupancy;
 pub mod pose_graph;
 pub mod recall;
+pub mod recording;
 pub mod registration;
 pub mod retrieval;
 pub mod sampling;

@@ -6,7 +6,6 @@ use locution_engine::config::EngineConfig;
 use locution_engine::geometry::{Point2, Pose2, wrap_angle};
 use locution_engine::mapping::{
     Decision, Keyframe, MatchState, RegistrationMemo, RejectionReason, RunRecord, SiteMap, map_site,
-    place_in_map,
 };
 use locution_engine::scan::ScanGeometry;
 use locution_engine::text::{Observation, Word};
@@ -207,7 +206,6 @@ fn what_the_memo_holds_does_not_change_the_map() {
     assert_eq!(remembered, mapped(&[&first, &second], &[], &mut RegistrationMemo::default()));
     assert_eq!(mapped(&[], &[], &mut memo), SiteMap::default());
     let last = first.keyframes.last().unwrap();
-    assert!(
-        place_in_map(&first.keyframes, &remembered.runs[0], last.scan_seq, &last.run_from_robot).is_some()
-    );
+    let trajectory = remembered.runs[0].trajectory(&first.keyframes);
+    assert!(trajectory.at(last.scan_seq, &last.run_from_robot).is_some());
 }

@@ -11,7 +11,8 @@ use axum::http::{HeaderMap, StatusCode, header};
 use serde::de::DeserializeOwned;
 use tokio::sync::OwnedSemaphorePermit;
 
-use crate::app::{AppError, Name, Site};
+use crate::app::site::Site;
+use crate::app::{AppError, Name};
 use crate::error::ApiError;
 use crate::state::AppState;
 

@@ -3,28 +3,42 @@
 use std::path::Path;
 use std::process::Command;
 
-use locution_tests::{TestServer, drive, geometry};
+use locution_tests::{TestServer, drive, geometry, locution_binary};
 use serde_json::{Value, json};
 
-/// A fenced command with the answer that follows it, if one does.
+/// A command of a fenced block with the answer that follows it, if one does.
 struct Shown {
     command: String,
     answer: Option<Value>,
 }
 
-/// The commands of a page that call the server, in their order.
+/// The commands of a page's `sh` blocks that call the server or the binary, in their order.
 fn shown_commands(page: &str) -> Vec<Shown> {
     let mut shown: Vec<Shown> = Vec::new();
     let mut blocks = page.split("\n```");
     blocks.next();
     for block in blocks {
-        if let Some(command) = block.strip_prefix("sh\n").filter(|text| text.starts_with("curl")) {
-            shown.push(Shown { command: command.to_owned(), answer: None });
-        } else if let Some(answer) = block.strip_prefix("json\n") {
-            shown.last_mut().unwrap().answer = Some(serde_json::from_str(answer).unwrap());
+        if let Some(commands) = block.strip_prefix("sh\n") {
+            let mut commands = commands_of(commands);
+            commands.retain(|command| command.starts_with("curl") || command.starts_with("cargo run"));
+            shown.extend(commands.into_iter().map(|command| Shown { command, answer: None }));
+        } else if let (Some(answer), Some(last)) = (block.strip_prefix("json\n"), shown.last_mut()) {
+            last.answer = Some(serde_json::from_str(answer).unwrap());
         }
     }
     shown
+}
+
+/// The commands of a block: each begins at the start of a line and goes on in indented ones.
+fn commands_of(block: &str) -> Vec<String> {
+    let mut commands: Vec<String> = Vec::new();
+    for line in block.lines().filter(|line| !line.trim().is_empty()) {
+        match commands.last_mut() {
+            Some(last) if line.starts_with(' ') => *last = format!("{last}\n{line}"),
+            _ => commands.push(line.to_owned()),
+        }
+    }
+    commands
 }
 
 /// Whether an answer has every member of the shown one, with values of the same kinds. Of a list the first items are
@@ -57,10 +71,47 @@ fn likeness_is_of_members_and_kinds() {
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn the_documented_commands_answer_as_shown() {
-    if Command::new("curl").arg("--version").output().is_err() {
+/// Runs the commands of a page against a server and compares the answers with the ones shown; how many there were.
+async fn run_page(page: &str, server: &TestServer, directory: &Path) -> usize {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(page);
+    let shown = shown_commands(&std::fs::read_to_string(page).unwrap());
+    let address = server.api.base.trim_start_matches("http://");
+    let binary = locution_binary();
+    let mut num_run = 0;
+    for Shown { command, answer } in shown {
+        // The server runs already, and the demo is a test of its own.
+        if command.contains("-- serve") || command.contains("-- demo") {
+            continue;
+        }
+        num_run += 1;
+        let script = command
+            .replace("localhost:7070", address)
+            .replacen("curl", "curl --silent --show-error --fail-with-body", 1)
+            .replacen("cargo run --release --", &binary.to_string_lossy(), 1);
+        let mut shell = Command::new("sh");
+        shell.args(["-c", &script]).current_dir(directory);
+        let ran = tokio::task::spawn_blocking(move || shell.output()).await.unwrap().unwrap();
+        let body = String::from_utf8_lossy(&ran.stdout).into_owned();
+        assert!(ran.status.success(), "{command}\n{body}\n{}", String::from_utf8_lossy(&ran.stderr));
+        if let Some(shown) = answer {
+            let answered: Value = serde_json::from_str(&body).unwrap();
+            assert!(is_like(&shown, &answered), "{command}\nshown    {shown}\nanswered {answered}");
+        }
+    }
+    num_run
+}
+
+fn has_curl() -> bool {
+    let is_there = Command::new("curl").arg("--version").output().is_ok();
+    if !is_there {
         println!("skipped: curl is not installed");
+    }
+    is_there
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_commands_of_api_page_and_tour_answer_as_shown() {
+    if !has_curl() {
         return;
     }
     let server = TestServer::start().await;
@@ -74,25 +125,27 @@ async fn the_documented_commands_answer_as_shown() {
     let example = json!({"geometry": geometry(), "scans": drive(900, 3)[500..700]});
     std::fs::write(directory.path().join("example.json"), example.to_string()).unwrap();
 
-    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/api-design.md");
-    let shown = shown_commands(&std::fs::read_to_string(page).unwrap());
-    assert!(shown.len() >= 10, "{} commands", shown.len());
-    for Shown { command, answer } in shown {
-        let address = server.api.base.trim_start_matches("http://");
-        let script = command.replace("localhost:7070", address).replacen(
-            "curl",
-            "curl --silent --show-error --fail-with-body",
-            1,
-        );
-        let mut shell = Command::new("sh");
-        shell.args(["-c", &script]).current_dir(directory.path());
-        let ran = tokio::task::spawn_blocking(move || shell.output()).await.unwrap().unwrap();
-        let body = String::from_utf8_lossy(&ran.stdout).into_owned();
-        assert!(ran.status.success(), "{command}\n{body}\n{}", String::from_utf8_lossy(&ran.stderr));
-        if let Some(shown) = answer {
-            let answered: Value = serde_json::from_str(&body).unwrap();
-            assert!(is_like(&shown, &answered), "{command}\nshown    {shown}\nanswered {answered}");
-        }
+    assert!(run_page("docs/api-design.md", &server, directory.path()).await >= 10);
+    assert!(run_page("docs/tour/5-a-question-by-words.md", &server, directory.path()).await == 1);
+    assert!(run_page("docs/tour/6-where-am-i.md", &server, directory.path()).await == 1);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_commands_of_the_readme_make_a_map() {
+    if !has_curl() {
+        return;
     }
+    let server = TestServer::start().await;
+    let directory = tempfile::tempdir().unwrap();
+    let world = Path::new(env!("CARGO_MANIFEST_DIR")).join("../clients/cli/worlds/office.yaml");
+    let drive = Command::new(locution_binary())
+        .args(["simulate", "--wander", "20", "--gzip", "--out", "my-robot", "--world"])
+        .arg(world)
+        .current_dir(directory.path())
+        .output()
+        .unwrap();
+    assert!(drive.status.success(), "{}", String::from_utf8_lossy(&drive.stderr));
+    assert_eq!(run_page("README.md", &server, directory.path()).await, 6);
     server.stop().await;
 }

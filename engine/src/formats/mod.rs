@@ -28,4 +28,4 @@ mod tum;
 pub use g2o::{read_g2o, write_g2o};
 pub use graph_text::{GraphDocument, GraphTextError};
 pub use toro::{read_toro, write_toro};
-pub use tum::{read_tum, write_tum};
+pub use tum::write_tum;

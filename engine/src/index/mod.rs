@@ -3,6 +3,7 @@
 //! [`Lattice`] is one run's text arranged for comparing it with another, [`OccurrenceIndex`] is all texts of a site
 //! packed for questions.
 
+mod fits;
 mod lattice;
 mod occurrence;
 mod packed;
@@ -15,6 +16,7 @@ mod tolerance;
 #[cfg(test)]
 mod search_tests;
 
+pub use fits::{PatternFit, WordPattern, WordSequence};
 pub use lattice::{AlikeColumns, Lattice, LatticeError, LevelColumns, num_nodes_covered};
 pub use occurrence::OccurrenceIndex;
 pub use packed::{STORED_WORD_BYTES, store_words};

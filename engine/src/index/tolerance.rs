@@ -98,6 +98,11 @@ impl Syllables {
         }
     }
 
+    /// The turn in radians, as exactly as it is kept.
+    pub fn turn_rad(&self) -> f64 {
+        f64::from(self.turn) / UNITS_PER_PI * PI
+    }
+
     /// The word as it reads when its place is driven the other way: the turn changes sign.
     pub fn reversed(&self) -> Self {
         Self { turn: self.turn.wrapping_neg(), ..*self }

@@ -66,21 +66,13 @@ impl<'a> Judgements<'a> {
 
     /// Settles a match on which a person spoke; the latest word counts.
     pub fn settle(&self, found: &mut PlaceMatch) {
-        let holds = |decision: &&Decision| {
-            decision.direction == found.direction
-                && overlaps(&decision.earlier, &found.earlier)
-                && overlaps(&decision.later, &found.later)
-        };
-        let Some(decision) = self.decisions.iter().rev().find(holds) else { return };
+        let on_it = self.decisions.iter().rev().find(|decision| decision.is_about(found));
+        let Some(decision) = on_it else { return };
         (found.state, found.probability) = match decision.is_same_place {
             true => (MatchState::Verified, 1.0),
             false => (MatchState::Rejected(RejectionReason::Vetoed), 0.0),
         };
     }
-}
-
-fn overlaps(a: &Interval, b: &Interval) -> bool {
-    a.run_idx == b.run_idx && a.first <= b.last && b.first <= a.last
 }
 
 /// Anchors whose submaps reach into an interval; none when the run does not hold it.

@@ -31,7 +31,7 @@ pub use config::MappingConfig;
 pub use mapper::map_site;
 pub use memo::RegistrationMemo;
 pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
-pub use placement::{place_in_map, place_observations};
+pub use placement::place_observations;
 pub use run::{Keyframe, RunRecord};
 pub use site_map::{MappedRun, SiteMap};
 pub use text_evidence::weigh_texts;

@@ -112,3 +112,12 @@ pub struct Decision {
     /// True: it is the same place, whatever the evidence. False: it is not.
     pub is_same_place: bool,
 }
+
+impl Decision {
+    /// Whether it was made on the pair of places of a match.
+    pub fn is_about(&self, found: &PlaceMatch) -> bool {
+        self.direction == found.direction
+            && self.earlier.overlaps(&found.earlier)
+            && self.later.overlaps(&found.later)
+    }
+}

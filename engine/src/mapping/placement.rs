@@ -1,32 +1,32 @@
-//! Places anything of a run in the map: nearest keyframe, then the run's own odometry.
+//! Places the observations of a run in the map.
 
 use super::run::{Keyframe, RunRecord};
 use super::site_map::MappedRun;
 use crate::geometry::Pose2;
+use crate::recording::{PlacedKeyframe, RunTrajectory};
 
-/// Pose in the map of whatever the run saw at scan `scan_seq` from `run_from_robot`; none for a run without keyframes.
-///
-/// The keyframe at or before the scan carries it: its pose in the map, then the run's own motion since.
-pub fn place_in_map(
-    keyframes: &[Keyframe],
-    mapped: &MappedRun,
-    scan_seq: u64,
-    run_from_robot: &Pose2,
-) -> Option<Pose2> {
-    let after = keyframes.partition_point(|keyframe| keyframe.scan_seq <= scan_seq);
-    let index = after.saturating_sub(1);
-    let keyframe = keyframes.get(index)?;
-    let map_from_keyframe = mapped.map_from_keyframes.get(index)?;
-    Some(map_from_keyframe.compose(&keyframe.run_from_robot.between(run_from_robot)))
+impl MappedRun {
+    /// Where the run was in the map at any scan.
+    pub fn trajectory(&self, keyframes: &[Keyframe]) -> RunTrajectory {
+        let placed = keyframes.iter().zip(&self.map_from_keyframes);
+        placed
+            .map(|(keyframe, map_from_robot)| PlacedKeyframe {
+                scan_seq: keyframe.scan_seq,
+                run_from_robot: keyframe.run_from_robot,
+                map_from_robot: *map_from_robot,
+            })
+            .collect()
+    }
 }
 
-/// Poses in the map of all observations of a run, in order.
+/// Poses in the map of all observations of a run, in order; those of a run without keyframes stay in its own frame.
 pub fn place_observations(run: &RunRecord<'_>, mapped: &MappedRun) -> Vec<Pose2> {
+    let trajectory = mapped.trajectory(run.keyframes);
     run.observations
         .iter()
         .map(|observation| {
-            place_in_map(run.keyframes, mapped, observation.scan_seq, &observation.run_from_robot)
-                .unwrap_or(observation.run_from_robot)
+            let own = observation.run_from_robot;
+            trajectory.at(observation.scan_seq, &own).unwrap_or(own)
         })
         .collect()
 }

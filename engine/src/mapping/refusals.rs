@@ -62,18 +62,14 @@ fn best_apart<'c>(candidates: impl Iterator<Item = &'c Candidate>) -> Vec<&'c Pr
     for profile in ranked {
         let is_listed = chosen.iter().any(|other| {
             other.direction == profile.direction
-                && overlap(&other.earlier, &profile.earlier)
-                && overlap(&other.later, &profile.later)
+                && other.earlier.overlaps(&profile.earlier)
+                && other.later.overlaps(&profile.later)
         });
         if !is_listed && chosen.len() < NUM_REFUSED_MAX {
             chosen.push(profile);
         }
     }
     chosen
-}
-
-fn overlap(a: &Interval, b: &Interval) -> bool {
-    a.run_idx == b.run_idx && a.first <= b.last && b.first <= a.last
 }
 
 #[cfg(test)]

@@ -93,8 +93,8 @@ impl Site<'_> {
 
     /// Whether a pair of matching words of a chain lies in both stretches.
     fn passes_through(&self, chain: &RunMatch, found: &PlaceMatch) -> bool {
-        overlap(&chain.earlier, &found.earlier)
-            && overlap(&chain.later, &found.later)
+        chain.earlier.overlaps(&found.earlier)
+            && chain.later.overlaps(&found.later)
             && chain.chain.pairs.iter().any(|(earlier, later)| {
                 let spans = (self.text(&found.earlier).observations_of(*earlier))
                     .zip(self.text(&found.later).observations_of(*later));
@@ -140,8 +140,8 @@ impl Site<'_> {
             }
             let is_known = |known: &PlaceMatch| {
                 known.direction == found.chain.direction
-                    && overlap(&known.earlier, &found.earlier)
-                    && overlap(&known.later, &found.later)
+                    && known.earlier.overlaps(&found.earlier)
+                    && known.later.overlaps(&found.later)
             };
             if map.matches.iter().chain(&claims).any(is_known) {
                 continue;
@@ -224,10 +224,6 @@ fn refusal(evidence: &Evidence, apart_m: Option<f64>, max_chance_matches: f64) -
     } else {
         None
     }
-}
-
-fn overlap(a: &Interval, b: &Interval) -> bool {
-    a.run_idx == b.run_idx && a.first <= b.last && b.first <= a.last
 }
 
 fn touches(interval: &Interval, (first, last): (u32, u32)) -> bool {

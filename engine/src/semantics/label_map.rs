@@ -10,7 +10,7 @@ use super::label::PlaceLabel;
 use super::rules::label_of;
 use super::signature::{PlaceSignature, SignatureReader};
 use crate::geometry::{Point2, Pose2, angle_between};
-use crate::mapping::{Keyframe, RunRecord};
+use crate::mapping::{MappedRun, RunRecord, place_observations};
 use crate::scan::ScanGeometry;
 
 /// One run, at its poses in the map.
@@ -25,25 +25,14 @@ pub struct DrivenRun<'a> {
 }
 
 impl<'a> DrivenRun<'a> {
-    /// A run as the map builder placed it: scans at their keyframes' poses, observations carried along from the
-    /// last keyframe before each.
-    pub fn in_map(record: &RunRecord<'a>, map_from_keyframes: &[Pose2]) -> Self {
-        let placed: Vec<(&'a Keyframe, Pose2)> =
-            record.keyframes.iter().zip(map_from_keyframes.iter().copied()).collect();
-        let map_from_observations = record
-            .observations
-            .iter()
-            .map(|observation| {
-                let next = placed.partition_point(|(keyframe, _)| keyframe.scan_seq <= observation.scan_seq);
-                match placed.get(next.saturating_sub(1)) {
-                    Some((keyframe, map_from_keyframe)) => map_from_keyframe
-                        .compose(&keyframe.run_from_robot.between(&observation.run_from_robot)),
-                    None => observation.run_from_robot,
-                }
-            })
-            .collect();
-        let scans = placed.iter().map(|(keyframe, pose)| (*pose, keyframe.ranges_m.as_slice())).collect();
-        Self { geometry: record.geometry, scans, map_from_observations }
+    /// A run as the map builder placed it.
+    pub fn in_map(record: &RunRecord<'a>, mapped: &MappedRun) -> Self {
+        let placed = record.keyframes.iter().zip(&mapped.map_from_keyframes);
+        Self {
+            geometry: record.geometry,
+            scans: placed.map(|(keyframe, pose)| (*pose, keyframe.ranges_m.as_slice())).collect(),
+            map_from_observations: place_observations(record, mapped),
+        }
     }
 }
 

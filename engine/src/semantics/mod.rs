@@ -6,9 +6,10 @@
 //! runs at their poses in the map ─► blocks of occupancy ─► signature of each position ─► rules ─► labels
 //!                                   (what all runs saw)    (passages that leave it,       (all passes vote)
 //!                                                           bends, driven ways, halls)        │
-//!                                        routes and patterns of places ◄─ places of the map ◄─┘
+//!                                    routes, stretches of one label ◄─ places of the map ◄─┘
 //! ```
-//! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it.
+//! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it, and [`MapLabels`] does both
+//! for every component of a map.
 
 mod block;
 mod config;
@@ -16,13 +17,14 @@ mod decision_tree;
 mod flood;
 mod label;
 mod label_map;
+mod map_labels;
 mod outline;
-mod pattern;
 mod places;
 mod route;
 mod rules;
 mod segmentation;
 mod signature;
+mod stretches;
 #[cfg(test)]
 mod tests;
 
@@ -30,9 +32,10 @@ pub use config::SemanticsConfig;
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};
 pub use label::PlaceLabel;
 pub use label_map::{DrivenRun, LabeledRun, label_runs};
-pub use pattern::{PatternMatch, PlacePattern, find_pattern};
+pub use map_labels::MapLabels;
 pub use places::{Place, PlaceMap, Spot, Visit};
 pub use route::{Route, RouteStep, Turn, route};
 pub use rules::label_of;
 pub use segmentation::{Segment, SegmentationConfig, segments};
 pub use signature::PlaceSignature;
+pub use stretches::{LabelPattern, LabeledStretch, PatternMatch, find_pattern, labeled_stretches};

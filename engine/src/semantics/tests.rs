@@ -135,20 +135,6 @@ fn a_route_is_told_in_words_both_ways() {
 }
 
 #[test]
-fn patterns_fit_driving_either_way() {
-    let map = angle().map;
-    let place = |label, turn| PlacePattern { label: Some(label), turn, ..PlacePattern::default() };
-    let long = PlacePattern { length_min_m: Some(10.0), ..place(PlaceLabel::Corridor, None) };
-    let left = find_pattern(&map, &[long, place(PlaceLabel::Corner, Some(Turn::Left))]);
-    assert_eq!(left.len(), 1);
-    assert!(!left[0].is_reversed);
-    let right = find_pattern(&map, &[long, place(PlaceLabel::Corner, Some(Turn::Right))]);
-    assert!(right.len() == 1 && right[0].is_reversed);
-    assert!(find_pattern(&map, &[place(PlaceLabel::Hall, None)]).is_empty());
-    assert!(find_pattern(&map, &[]).is_empty());
-}
-
-#[test]
 fn places_know_their_neighbors_and_their_ground() {
     let map = angle().map;
     let corner = map.places.iter().position(|place| place.label == PlaceLabel::Corner).expect("a corner");

@@ -13,6 +13,13 @@ pub struct Interval {
     pub last: u32,
 }
 
+impl Interval {
+    /// Whether two stretches have an observation in common.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.run_idx == other.run_idx && self.first <= other.last && other.first <= self.last
+    }
+}
+
 /// Whether the place was driven the same way both times.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

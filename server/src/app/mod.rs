@@ -1,10 +1,16 @@
 //! Use cases: load, call the engine on a blocking thread, store. No HTTP and no sled here.
 //!
 //! ```text
-//! App ─► Site (one storage handle) ─► RunWriter (one at a time) ─► translation ─► one commit ─► receipt
-//!                                  └► readers: observations, words, scans, trajectories, maps, matches
-//!                                  └► jobs: builds and new text generations, in the background
+//! sites   made, found, described, deleted
+//! runs    a batch ─► the run's one writer ─► translator ─► one commit ─► receipt;  trajectories
+//! jobs    in the background: maps are built, texts written anew
+//! maps    versions written and served: regions, matches, labels, places, changes, grids, pictures
+//! ask     by words, by a short recording, by a robot that drives
+//!   └─ all on ─► site   the record and how it changes; the parts that a process keeps of a site
 //! ```
+//!
+//! [`Site`] is state and its change. A use case is a function of its folder; it is a method of [`App`] when it needs
+//! what the process shares: limits, queues, caches.
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
@@ -19,47 +25,24 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use crate::config::ServerConfig;
 use crate::storage::Storage;
 
-mod builds;
-pub mod changes;
+pub mod ask;
 mod error;
-pub mod examples;
-pub mod exports;
-mod grids;
-mod ingest;
 mod jobs;
-pub mod labels;
-pub mod localizations;
 pub mod maps;
-pub mod matches;
 mod names;
-mod open_runs;
-mod places;
-pub mod reading;
-pub mod records;
-mod regenerate;
-pub mod regions;
-mod run_writer;
-mod runs;
-mod scans;
-mod series;
-mod site;
-mod site_texts;
-mod trajectory;
-mod translation;
-pub mod word_queries;
+pub mod runs;
+#[cfg(test)]
+mod script_tests;
+pub mod site;
+mod sites;
 
 pub use error::AppError;
-pub use ingest::NewBatch;
-pub use jobs::{JobInfo, JobKind, JobState};
 pub use names::Name;
-pub use runs::{NewRun, RunInfo};
-pub use site::{Site, SiteInfo, SiteState, TextConfig};
-pub use trajectory::{Frame, StampedPose, Trajectory};
 
-use examples::PlaceIndexes;
-use grids::GridKey;
-use localizations::Localizations;
-use open_runs::OpenRuns;
+use ask::{Localizations, PlaceIndexes};
+use maps::GridKey;
+use runs::OpenRuns;
+use site::Site;
 
 /// Grids kept in memory; each has at most 64 million cells of one byte.
 const NUM_GRIDS_KEPT: NonZeroUsize = NonZeroUsize::new(4).expect("four is not zero");

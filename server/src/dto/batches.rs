@@ -9,9 +9,9 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use utoipa::ToSchema;
 
 use super::common::PoseDto;
-use crate::app::NewBatch;
-use crate::app::records::Receipt;
+use crate::app::runs::NewBatch;
 use crate::error::ApiError;
+use crate::records::Receipt;
 
 /// Readings in metres; one without a return is null in JSON, null, NaN or ∞ in CBOR, and NaN here.
 ///

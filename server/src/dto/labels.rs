@@ -1,11 +1,11 @@
 //! Labels on the wire.
 
-use locution_engine::semantics::PlaceLabel;
+use locution_engine::semantics::{LabelPattern, PlaceLabel};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::labels::{LabelAnswer, LabelPattern, LabeledStretch};
+use crate::app::maps::{DrivenStretch, LabelAnswer};
 use crate::error::ApiError;
 
 /// Most parts of a question.
@@ -52,11 +52,12 @@ pub struct LabelDto {
     pub map_from_middle: PoseDto,
 }
 
-impl From<LabeledStretch> for LabelDto {
-    fn from(stretch: LabeledStretch) -> Self {
+impl From<DrivenStretch> for LabelDto {
+    fn from(driven: DrivenStretch) -> Self {
+        let stretch = driven.stretch;
         Self {
-            run: stretch.run,
-            component: stretch.component,
+            run: driven.run,
+            component: driven.component,
             label: stretch.label.name().into(),
             first: stretch.first,
             last: stretch.last,

@@ -8,9 +8,8 @@ use utoipa::ToSchema;
 use super::batches::ScanDto;
 use super::common::PoseDto;
 use super::runs::GeometryDto;
-use crate::app::NewBatch;
-use crate::app::examples::{ExampleInfo, ExamplePlace};
-use crate::app::localizations::LocalizationInfo;
+use crate::app::ask::{ExampleInfo, ExamplePlace, LocalizationInfo};
+use crate::app::runs::NewBatch;
 use crate::error::ApiError;
 
 /// Opens a localisation; the same body as that of a run.
@@ -89,7 +88,7 @@ impl From<LocalizationInfo> for LocalizationDto {
 }
 
 fn hypotheses_of(info: &LocalizationInfo) -> Vec<HypothesisDto> {
-    let hypothesis = |found: &crate::app::localizations::LocatedHypothesis| HypothesisDto {
+    let hypothesis = |found: &crate::app::ask::LocatedHypothesis| HypothesisDto {
         component: found.component,
         map_from_robot: found.map_from_robot.into(),
         covariance: found.covariance,

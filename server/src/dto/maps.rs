@@ -1,13 +1,13 @@
 //! Maps and matches on the wire.
 
-use locution_engine::mapping::{MatchState, PlaceMatch};
+use locution_engine::mapping::{Channel, Direction, MatchState, PlaceMatch};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::maps::{MapRecord, MapRun};
-use crate::app::matches::{MatchFilter, NumberedMatch, channel_name, direction_name, state_name};
+use crate::app::maps::{MatchFilter, MatchStateKind, NumberedMatch};
 use crate::error::ApiError;
+use crate::records::{MapRecord, MapRun};
 
 /// Which map.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
@@ -184,19 +184,39 @@ impl MatchParams {
     /// # Errors
     /// 422 for a word that is none of the choices.
     pub fn filter(&self, run: Option<u32>) -> Result<MatchFilter, ApiError> {
-        let one_of = |field: &str, value: &Option<String>, choices: &[&str]| match value {
-            Some(value) if !choices.contains(&value.as_str()) => {
-                Err(ApiError::invalid(field, format!("one of {}", choices.join(", "))))
-            }
-            value => Ok(value.clone()),
-        };
         Ok(MatchFilter {
-            state: one_of("state", &self.state, &["candidate", "verified", "rejected"])?,
-            channel: one_of("channel", &self.channel, &["words", "profile", "spatial"])?,
-            direction: one_of("direction", &self.direction, &["same", "opposite"])?,
+            state: one_of("state", self.state.as_deref(), STATES)?,
+            channel: one_of("channel", self.channel.as_deref(), CHANNELS)?,
+            direction: one_of("direction", self.direction.as_deref(), DIRECTIONS)?,
             run,
         })
     }
+}
+
+/// Values with their spelling.
+type Spelling<T> = &'static [(T, &'static str)];
+
+const STATES: Spelling<MatchStateKind> = &[
+    (MatchStateKind::Candidate, "candidate"),
+    (MatchStateKind::Verified, "verified"),
+    (MatchStateKind::Rejected, "rejected"),
+];
+const CHANNELS: Spelling<Channel> =
+    &[(Channel::Words, "words"), (Channel::Profile, "profile"), (Channel::Spatial, "spatial")];
+const DIRECTIONS: Spelling<Direction> = &[(Direction::Same, "same"), (Direction::Opposite, "opposite")];
+
+fn one_of<T: Copy>(field: &str, word: Option<&str>, choices: Spelling<T>) -> Result<Option<T>, ApiError> {
+    let Some(word) = word else { return Ok(None) };
+    let chosen = choices.iter().find(|(_, spelled)| *spelled == word).map(|(value, _)| Some(*value));
+    chosen.ok_or_else(|| {
+        let words: Vec<&str> = choices.iter().map(|(_, spelled)| *spelled).collect();
+        ApiError::invalid(field, format!("one of {}", words.join(", ")))
+    })
+}
+
+fn spelled<T: PartialEq>(value: &T, choices: Spelling<T>) -> String {
+    let known = choices.iter().find(|(choice, _)| choice == value);
+    known.map(|(_, spelled)| (*spelled).to_owned()).expect("every value has its spelling in the table")
 }
 
 /// A stretch of driving.
@@ -272,11 +292,11 @@ impl MatchDto {
             id: numbered.id.to_string(),
             earlier: interval(&found.earlier),
             later: interval(&found.later),
-            direction: direction_name(found).into(),
-            channel: channel_name(found).into(),
+            direction: spelled(&found.direction, DIRECTIONS),
+            channel: spelled(&found.channel, CHANNELS),
             evidence: serde_json::to_value(&found.evidence).unwrap_or_default(),
             probability: found.probability,
-            state: state_name(&found.state).into(),
+            state: spelled(&MatchStateKind::from(&found.state), STATES),
             reason: reason.and_then(|reason| reason.as_str().map(str::to_owned)),
             decision: numbered.decision.map(|is_same_place| match is_same_place {
                 true => DecisionKindDto::Confirm,

@@ -1,11 +1,12 @@
 //! Questions by word pattern on the wire.
 
+use locution_engine::index::WordPattern;
 use locution_engine::mapping::Direction;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::common::PoseDto;
-use crate::app::word_queries::{WordAnswer, WordPattern};
+use crate::app::ask::WordAnswer;
 use crate::error::ApiError;
 
 /// Most words of a question.

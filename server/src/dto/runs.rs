@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::common::PoseDto;
-use crate::app::{NewRun, RunInfo};
+use crate::app::runs::NewRun;
 use crate::error::ApiError;
+use crate::records::Run;
 
 /// What all scans of a run share.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -120,17 +121,17 @@ pub struct RunDto {
     pub num_words: u64,
 }
 
-impl From<RunInfo> for RunDto {
-    fn from(info: RunInfo) -> Self {
+impl From<Run> for RunDto {
+    fn from(run: Run) -> Self {
         Self {
-            run: info.run.name.clone(),
-            robot: info.run.robot.clone(),
-            geometry: GeometryDto::from(&info.run.geometry),
-            state: if info.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
-            next_sequence: info.head.next_sequence,
-            num_scans: info.head.next_sequence,
-            num_observations: info.text.num_observations,
-            num_words: info.text.num_words_all_levels(),
+            run: run.record.name.clone(),
+            robot: run.record.robot.clone(),
+            geometry: GeometryDto::from(&run.record.geometry),
+            state: if run.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
+            next_sequence: run.head.next_sequence,
+            num_scans: run.head.next_sequence,
+            num_observations: run.text.num_observations,
+            num_words: run.text.num_words_all_levels(),
         }
     }
 }

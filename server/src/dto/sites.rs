@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::SiteInfo;
+use crate::app::site::SiteInfo;
 
 /// Makes a site.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]

@@ -2,12 +2,13 @@
 
 use std::fmt::Write;
 
+use locution_engine::formats::write_tum;
 use locution_engine::text::{Observation, Word, WordId};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use super::common::PoseDto;
-use crate::app::{Frame, StampedPose, Trajectory};
+use crate::app::runs::{Frame, StampedPose, Trajectory};
 
 /// A density sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -191,16 +192,7 @@ impl From<Trajectory> for TrajectoryDto {
     }
 }
 
-/// TUM's format: `timestamp tx ty tz qx qy qz qw`, seconds with nine decimals from the integer nanoseconds.
+/// TUM's format.
 pub fn trajectory_as_tum(poses: &[StampedPose]) -> String {
-    let mut text = String::with_capacity(poses.len() * 80);
-    for pose in poses {
-        let nanoseconds = i128::from(pose.timestamp_ns);
-        let sign = if nanoseconds < 0 { "-" } else { "" };
-        let (seconds, rest) = (nanoseconds.abs() / 1_000_000_000, nanoseconds.abs() % 1_000_000_000);
-        let at = pose.frame_from_robot;
-        let (sin, cos) = (at.theta / 2.0).sin_cos();
-        let _ = writeln!(text, "{sign}{seconds}.{rest:09} {:.6} {:.6} 0 0 0 {sin:.9} {cos:.9}", at.x, at.y);
-    }
-    text
+    write_tum(poses.iter().map(|pose| (pose.timestamp_ns, pose.frame_from_robot)))
 }

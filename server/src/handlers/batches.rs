@@ -3,7 +3,6 @@
 use axum::Json;
 use axum::extract::State;
 
-use crate::app::reading::read_run_scans;
 use crate::dto::batches::{BatchDto, ReceiptDto, StoredScanDto};
 use crate::dto::common::{Page, PageParams};
 use crate::error::{ApiError, Problem};
@@ -41,8 +40,8 @@ pub async fn list_scans(
     Params(page): Params<PageParams>,
 ) -> Result<Json<Page<StoredScanDto>>, ApiError> {
     let (first, limit) = (page.first()?, page.limit()?);
-    let info = site.run(&name).await?;
-    let scans = read_run_scans(&**site.store(), &info, first, limit).await?;
+    let run = site.run(&name).await?;
+    let scans = run.scans(first..first.saturating_add(limit as u64)).await?;
     let items = (first..).zip(scans).map(|(scan_seq, scan)| StoredScanDto::new(scan_seq, scan)).collect();
-    Ok(Json(Page::of(items, first, info.head.next_sequence)))
+    Ok(Json(Page::of(items, first, run.head.next_sequence)))
 }

@@ -4,7 +4,7 @@ use axum::Json;
 use axum::extract::State;
 
 use crate::app::AppError;
-use crate::app::changes::{NoSessions, Sessions};
+use crate::app::maps::{NoSessions, Sessions};
 use crate::dto::changes::{ChangeDto, ChangesParams, names};
 use crate::dto::common::{Page, PageParams};
 use crate::error::{ApiError, Problem};
@@ -25,7 +25,7 @@ pub async fn list_changes(
     let (first, limit) = (page.first()?, page.limit()?);
     let map = site.map(params.version).await?;
     let (before, after) = (names(params.before.as_ref()), names(params.after.as_ref()));
-    let sessions = Sessions::new(&map, before.as_deref(), after.as_deref()).map_err(refusal)?;
+    let sessions = Sessions::new(&map.record, before.as_deref(), after.as_deref()).map_err(refusal)?;
     let changes = state.app.changes(&site, &map, &sessions).await?;
     let skipped = usize::try_from(first).unwrap_or(usize::MAX);
     let items = changes.iter().skip(skipped).take(limit);

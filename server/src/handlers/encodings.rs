@@ -5,12 +5,12 @@ use locution_engine::occupancy::{CellState, GridMap};
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::maps::{MapRecord, PlacedRun};
-use crate::app::regions::Topology;
+use crate::app::maps::Topology;
 use crate::dto::maps::{
     ConnectionDto, ConnectionKindDto, KeyframePoseDto, MapDto, MapRunDto, MapStatisticsDto, RegionDto,
     components_of,
 };
+use crate::records::{MapPose, MapRecord, PlacedRun};
 
 /// An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
@@ -110,7 +110,7 @@ pub fn map_dto(map: &MapRecord, versions: Vec<u64>, runs: &[PlacedRun], topology
 }
 
 fn run_dto(placed: &PlacedRun) -> MapRunDto {
-    let pose = |pose: &crate::app::maps::MapPose| {
+    let pose = |pose: &MapPose| {
         let at = pose.map_from_robot;
         KeyframePoseDto { scan_seq: pose.scan_seq, x: at.x, y: at.y, theta: at.theta }
     };

@@ -4,11 +4,11 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 
-use crate::app::JobKind;
 use crate::dto::common::{Page, PageParams};
 use crate::dto::jobs::{BuildParams, JobDto};
 use crate::error::{ApiError, Problem};
 use crate::extract::{IdOf, Params, SiteOf};
+use crate::records::JobKind;
 use crate::state::AppState;
 
 /// Build the map of everything stored now; the old version serves until the new one is complete.
@@ -24,7 +24,7 @@ pub async fn build_map(
     if !params.wait {
         return Ok((StatusCode::ACCEPTED, Json(job.into())));
     }
-    Ok((StatusCode::OK, Json(site.job_ended(job.record.id).await?.into())))
+    Ok((StatusCode::OK, Json(site.jobs().ended(job.record.id).await?.into())))
 }
 
 /// All jobs that are remembered, the newest first.
@@ -36,7 +36,7 @@ pub async fn list_jobs(
     Params(page): Params<PageParams>,
 ) -> Result<Json<Page<JobDto>>, ApiError> {
     let (first, limit) = (page.first()?, page.limit()?);
-    let jobs = site.jobs();
+    let jobs = site.jobs().all();
     let total = jobs.len() as u64;
     let skipped = usize::try_from(first).unwrap_or(usize::MAX);
     let items = jobs.into_iter().skip(skipped).take(limit).map(JobDto::from).collect();
@@ -48,5 +48,5 @@ pub async fn list_jobs(
     params(("site" = String, Path), ("id" = String, Path)),
     responses((status = 200, body = JobDto), (status = 404, body = Problem)))]
 pub async fn get_job(SiteOf(site): SiteOf, IdOf(id): IdOf) -> Result<Json<JobDto>, ApiError> {
-    Ok(Json(site.job(id)?.into()))
+    Ok(Json(site.jobs().get(id)?.into()))
 }

@@ -2,6 +2,7 @@
 
 use axum::Json;
 
+use crate::app::maps::{find_labels, labels};
 use crate::dto::common::{Page, PageParams};
 use crate::dto::labels::{LabelAnswerDto, LabelDto, LabelParams, LabelQueryDto};
 use crate::error::{ApiError, Problem};
@@ -17,7 +18,7 @@ pub async fn list_labels(
 ) -> Result<Json<Page<LabelDto>>, ApiError> {
     let page = PageParams { limit: params.limit, cursor: params.cursor };
     let (first, limit) = (page.first()?, page.limit()?);
-    let labels = site.labels(&site.map(params.version).await?).await?;
+    let labels = labels(&site.map(params.version).await?).await?;
     let total = labels.len() as u64;
     let skipped = usize::try_from(first).unwrap_or(usize::MAX);
     let items = labels.into_iter().skip(skipped).take(limit).map(LabelDto::from).collect();
@@ -35,6 +36,6 @@ pub async fn query_labels(
 ) -> Result<Json<Vec<LabelAnswerDto>>, ApiError> {
     let (patterns, limit) = query.check()?;
     let map = site.map(None).await?;
-    let answers = site.find_labels(&map, &patterns, limit).await?;
+    let answers = find_labels(&map, &patterns, limit).await?;
     Ok(Json(answers.into_iter().map(LabelAnswerDto::from).collect()))
 }

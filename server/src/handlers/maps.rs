@@ -7,18 +7,18 @@ use axum::response::{IntoResponse, Response};
 use locution_engine::formats::write_pgm;
 
 use super::encodings::{GridDto, gray_png, map_dto, yaml_of};
-use crate::app::exports::{PictureForm, gray_image};
-use crate::app::maps::MapRecord;
+use crate::app::maps::{PictureForm, graph_as_g2o, gray_image, map_trajectories, topology};
 use crate::app::{AppError, on_blocking_thread};
 use crate::dto::maps::{MapDto, MapParams};
 use crate::dto::texts::trajectory_as_tum;
 use crate::error::{ApiError, Problem};
 use crate::extract::{Params, SiteOf};
+use crate::records::Map;
 use crate::state::AppState;
 
 /// A form of the map with its version as ETag; 304 when the client has it.
-fn answer(map: &MapRecord, headers: &HeaderMap, content_type: &'static str, body: Vec<u8>) -> Response {
-    let tag = format!("\"{}\"", map.version);
+fn answer(map: &Map, headers: &HeaderMap, content_type: &'static str, body: Vec<u8>) -> Response {
+    let tag = format!("\"{}\"", map.record.version);
     if headers.get(header::IF_NONE_MATCH).is_some_and(|known| known.as_bytes() == tag.as_bytes()) {
         return (StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response();
     }
@@ -35,10 +35,11 @@ pub async fn get_map(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let map = site.map(params.version).await?;
-    let runs = site.placed_runs(&map, params.component).await?;
-    let topology = site.topology(&map, &runs).await?;
+    let runs = map.placed_runs(params.component).await?;
+    let topology = topology(&map, &runs).await?;
     let versions = site.map_versions().await?;
-    let body = serde_json::to_vec(&map_dto(&map, versions, &runs, topology)).map_err(AppError::internal)?;
+    let body =
+        serde_json::to_vec(&map_dto(&map.record, versions, &runs, topology)).map_err(AppError::internal)?;
     Ok(answer(&map, &headers, "application/json", body))
 }
 
@@ -114,7 +115,7 @@ pub async fn get_graph_g2o(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let map = site.map(params.version).await?;
-    let body = site.graph_as_g2o(&map, params.component).await?;
+    let body = graph_as_g2o(&map, params.component).await?;
     Ok(answer(&map, &headers, "text/plain; charset=utf-8", body.into_bytes()))
 }
 
@@ -128,7 +129,7 @@ pub async fn get_map_tum(
     headers: HeaderMap,
 ) -> Result<Response, ApiError> {
     let map = site.map(params.version).await?;
-    let poses = site.map_trajectories(&map, params.component).await?;
+    let poses = map_trajectories(&site, &map, params.component).await?;
     Ok(answer(&map, &headers, "text/plain; charset=utf-8", trajectory_as_tum(&poses).into_bytes()))
 }
 

@@ -4,6 +4,7 @@ use axum::Json;
 use axum::http::StatusCode;
 
 use crate::app::Name;
+use crate::app::maps::{a_match, decide, matches, undecide};
 use crate::dto::common::{Page, PageParams};
 use crate::dto::maps::{DecisionDto, DecisionKindDto, MapParams, MatchDto, MatchParams};
 use crate::error::{ApiError, Problem};
@@ -23,8 +24,8 @@ pub async fn list_matches(
         Some(run) => Some(site.run(&Name::new(run, "run")?).await?.idx),
         None => None,
     };
-    let (matches, next) = site.matches(&map, &params.filter(run)?, page.first()?, page.limit()?).await?;
-    let items = matches.into_iter().map(|found| MatchDto::new(found, &map)).collect();
+    let (matches, next) = matches(&map, &params.filter(run)?, page.first()?, page.limit()?).await?;
+    let items = matches.into_iter().map(|found| MatchDto::new(found, &map.record)).collect();
     Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }
 
@@ -38,7 +39,7 @@ pub async fn get_match(
     Params(params): Params<MapParams>,
 ) -> Result<Json<MatchDto>, ApiError> {
     let map = site.map(params.version).await?;
-    Ok(Json(MatchDto::new(site.a_match(&map, id).await?, &map)))
+    Ok(Json(MatchDto::new(a_match(&map, id).await?, &map.record)))
 }
 
 /// Veto or confirm a match. It sticks to the pair of places, also in maps to come, and counts at the next build.
@@ -52,9 +53,9 @@ pub async fn decide_match(
     Body(decision): Body<DecisionDto>,
 ) -> Result<Json<MatchDto>, ApiError> {
     let map = site.map(params.version).await?;
-    let found = site.a_match(&map, id).await?.found;
-    site.decide(&found, decision.decision == DecisionKindDto::Confirm).await?;
-    Ok(Json(MatchDto::new(site.a_match(&map, id).await?, &map)))
+    let found = a_match(&map, id).await?.found;
+    decide(&site, &found, decision.decision == DecisionKindDto::Confirm).await?;
+    Ok(Json(MatchDto::new(a_match(&map, id).await?, &map.record)))
 }
 
 /// Take back what was said of a match.
@@ -67,7 +68,7 @@ pub async fn undecide_match(
     Params(params): Params<MapParams>,
 ) -> Result<StatusCode, ApiError> {
     let map = site.map(params.version).await?;
-    let found = site.a_match(&map, id).await?.found;
-    site.undecide(&found).await?;
+    let found = a_match(&map, id).await?.found;
+    undecide(&site, &found).await?;
     Ok(StatusCode::NO_CONTENT)
 }

@@ -3,6 +3,7 @@
 use axum::Json;
 use locution_engine::geometry::Point2;
 
+use crate::app::maps::{find_route, places};
 use crate::dto::maps::MapParams;
 use crate::dto::places::{PlaceDto, RouteDto, RouteParams};
 use crate::error::{ApiError, Problem};
@@ -17,7 +18,7 @@ pub async fn list_places(
     Params(params): Params<MapParams>,
 ) -> Result<Json<Vec<PlaceDto>>, ApiError> {
     let map = site.map(params.version).await?;
-    let places = site.places(&map, params.component.unwrap_or(0)).await?;
+    let places = places(&map, params.component.unwrap_or(0)).await?;
     Ok(Json((0..).zip(&places.places).map(|(number, place)| PlaceDto::new(number, place)).collect()))
 }
 
@@ -31,5 +32,5 @@ pub async fn get_route(
 ) -> Result<Json<RouteDto>, ApiError> {
     let map = site.map(params.version).await?;
     let (from, to) = (Point2::new(params.from_x, params.from_y), Point2::new(params.to_x, params.to_y));
-    Ok(Json(site.route(&map, params.component, from, to).await?.into()))
+    Ok(Json(find_route(&map, params.component, from, to).await?.into()))
 }

@@ -3,6 +3,7 @@
 use axum::extract::State;
 use axum::{Extension, Json};
 
+use crate::app::ask::find_words;
 use crate::auth::Identity;
 use crate::dto::queries::{WordAnswerDto, WordQueryDto};
 use crate::error::{ApiError, Problem};
@@ -19,7 +20,7 @@ pub async fn query_words(
     Body(query): Body<WordQueryDto>,
 ) -> Result<Json<Vec<WordAnswerDto>>, ApiError> {
     let (patterns, limit) = query.check()?;
-    let answers = site.find_words(&patterns, limit).await?;
+    let answers = find_words(&site, &patterns, limit).await?;
     let name = site.name().as_str();
     Ok(Json(answers.into_iter().map(|answer| WordAnswerDto::new(name, answer)).collect()))
 }
@@ -37,7 +38,7 @@ pub async fn query_words_everywhere(
     let mut answers = Vec::new();
     for site in state.app.sites(|name| identity.may_see(name)).await? {
         let name = site.name().as_str();
-        let found = site.find_words(&patterns, limit).await?;
+        let found = find_words(&site, &patterns, limit).await?;
         answers.extend(found.into_iter().map(|answer| WordAnswerDto::new(name, answer)));
     }
     answers.sort_by(|a, b| b.fit.total_cmp(&a.fit));

@@ -3,7 +3,7 @@
 use axum::Json;
 use axum::response::{IntoResponse, Response};
 
-use crate::app::reading::{read_observations, read_words};
+use crate::app::runs::trajectory;
 use crate::dto::common::{Page, PageParams};
 use crate::dto::texts::{
     ObservationDto, TrajectoryDto, TrajectoryParams, WordDto, WordParams, trajectory_as_tum, words_as_text,
@@ -23,10 +23,10 @@ pub async fn list_observations(
     Params(page): Params<PageParams>,
 ) -> Result<Json<Page<ObservationDto>>, ApiError> {
     let (first, limit) = (page.first()?, page.limit()?);
-    let (generation, info) = (site.generation(), site.run(&name).await?);
-    let items = read_observations(&**site.store(), generation, &info, first, limit).await?;
+    let run = site.run(&name).await?;
+    let items = run.observations(first, limit).await?;
     let items = (first..).zip(items).map(|(number, item)| ObservationDto::new(number, item)).collect();
-    Ok(Json(Page::of(items, first, info.text.num_observations)))
+    Ok(Json(Page::of(items, first, run.text.num_observations)))
 }
 
 /// The text of a run, one level at a time; `Accept: text/plain` gives all words of the level, one a line.
@@ -42,14 +42,13 @@ pub async fn list_words(
 ) -> Result<Response, ApiError> {
     let page = PageParams { limit: params.limit, cursor: params.cursor };
     let (first, limit) = if wants_text { (0, usize::MAX) } else { (page.first()?, page.limit()?) };
-    let (generation, info) = (site.generation(), site.run(&name).await?);
-    let words = read_words(&**site.store(), generation, &info, params.level, first, limit).await?;
+    let run = site.run(&name).await?;
+    let words = run.words(params.level, first, limit).await?;
     if wants_text {
         return Ok(text(words_as_text(&words)));
     }
-    let num_words = info.text.num_words.get(usize::from(params.level)).copied().unwrap_or(0);
     let items = words.into_iter().map(WordDto::from).collect();
-    Ok(Json(Page::of(items, first, num_words)).into_response())
+    Ok(Json(Page::of(items, first, run.num_words(params.level))).into_response())
 }
 
 /// A pose for every scan, in the frame asked for; `Accept: text/plain` gives TUM's format.
@@ -63,8 +62,8 @@ pub async fn get_trajectory(
     WantsText(wants_text): WantsText,
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
-    let info = site.run(&name).await?;
-    let trajectory = site.trajectory(&info, params.frame.into(), params.version).await?;
+    let run = site.run(&name).await?;
+    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
     if wants_text {
         return Ok(text(trajectory_as_tum(&trajectory.poses)));
     }
@@ -80,7 +79,7 @@ pub async fn get_trajectory_tum(
     RunName(name): RunName,
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
-    let info = site.run(&name).await?;
-    let trajectory = site.trajectory(&info, params.frame.into(), params.version).await?;
+    let run = site.run(&name).await?;
+    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
     Ok(text(trajectory_as_tum(&trajectory.poses)))
 }

@@ -18,15 +18,14 @@ use async_trait::async_trait;
 use bytes::Bytes;
 use thiserror::Error;
 
-pub mod codec;
 #[cfg(test)]
 mod contract;
-pub mod keys;
+#[cfg(test)]
 mod memory;
-pub mod scan_chunk;
 mod sled_flusher;
 mod sled_store;
 
+#[cfg(test)]
 pub use memory::MemoryStorage;
 pub use sled_store::{SledConfig, SledStorage};
 

@@ -56,3 +56,8 @@ pub fn sources(folder: &str) -> Vec<Source> {
     assert!(!found.is_empty(), "no source found in {folder}");
     found
 }
+
+/// Fails with all complaints, if there are any.
+pub fn check(complaints: Vec<String>) {
+    assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
+}

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use locution_tidy::{Source, sources, workspace};
+use locution_tidy::{Source, check, sources, workspace};
 
 /// Longest source file, in lines before its tests.
 const MAX_FILE_LINES: usize = 500;
@@ -32,10 +32,6 @@ const SPELLINGS: &[(&str, &str)] = &[
     ("labelled", "labeled"),
     ("metre", "meter"),
 ];
-
-fn check(complaints: Vec<String>) {
-    assert!(complaints.is_empty(), "\n{}\n", complaints.join("\n"));
-}
 
 fn forbid(sources: &[Source], words: &[&str]) -> Vec<String> {
     let mut complaints = Vec::new();
@@ -67,11 +63,11 @@ fn the_engine_is_pure() {
     check(forbid(&sources("engine/src"), &forbidden));
 }
 
-/// The rows of ARCHITECTURE's table: a room of the engine and the rooms that it may use.
-fn rooms() -> Vec<(String, Vec<String>)> {
+/// The rows of one of ARCHITECTURE's tables: a room and the rooms that it may use.
+fn rooms(heading: &str) -> Vec<(String, Vec<String>)> {
     let text =
         fs::read_to_string(workspace().join("ARCHITECTURE.md")).expect("the page is part of the repository");
-    let table = text.split("## Rooms of the engine").nth(1).expect("the page has the table");
+    let table = text.split(heading).nth(1).expect("the page has the table");
     let table = table.split("\n## ").next().unwrap_or_default();
     let names = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
     let row = |line: &str| {
@@ -80,13 +76,20 @@ fn rooms() -> Vec<(String, Vec<String>)> {
         Some((room, names(cells.get(3)?)))
     };
     let rooms: Vec<_> = table.lines().filter(|line| line.starts_with("| `")).filter_map(row).collect();
-    assert!(rooms.len() > 15, "the table of rooms was not read: {rooms:?}");
+    assert!(rooms.len() > 5, "the table of rooms was not read: {rooms:?}");
     rooms
+}
+
+/// Names that follow `prefix` in a line of code.
+fn used<'a>(line: &'a str, prefix: &'a str) -> impl Iterator<Item = &'a str> {
+    let rests = line.split(prefix).skip(1);
+    let names = rests.filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next());
+    names.filter(|name| !name.is_empty())
 }
 
 #[test]
 fn every_room_of_the_engine_has_a_row_and_keeps_to_it() {
-    let rooms = rooms();
+    let rooms = rooms("## Rooms of the engine");
     let mut complaints = Vec::new();
     for source in sources("engine/src") {
         let path = source.path.to_string_lossy().replace('\\', "/");
@@ -100,10 +103,32 @@ fn every_room_of_the_engine_has_a_row_and_keeps_to_it() {
             continue;
         };
         for (line_idx, line) in source.statements() {
-            let used = line.split("crate::").skip(1);
-            let used = used.filter_map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_').next());
-            for used in used.filter(|used| !used.is_empty() && *used != room && !GROUND.contains(used)) {
+            for used in used(line, "crate::").filter(|used| *used != room && !GROUND.contains(used)) {
                 if !may_use.iter().any(|allowed| allowed == used) {
+                    complaints.push(source.complaint(line_idx, &format!("`{room}` may not use `{used}`")));
+                }
+            }
+        }
+    }
+    check(complaints);
+}
+
+#[test]
+fn rooms_of_the_server_keep_to_their_rows() {
+    let rooms = rooms("## Rooms of the server");
+    let mut complaints = Vec::new();
+    for (room, may_use) in &rooms {
+        let (top, folder) =
+            room.split_once('/').map_or((room.as_str(), None), |(top, folder)| (top, Some(folder)));
+        for source in sources(&format!("server/src/{room}")) {
+            for (line_idx, line) in source.statements() {
+                let of_app = used(line, "crate::app::").map(|name| format!("app/{name}"));
+                let used: Vec<String> = match folder {
+                    None => used(line, "crate::").filter(|name| *name != top).map(str::to_owned).collect(),
+                    // Types of the hall that all folders share begin with a capital letter.
+                    Some(_) => of_app.filter(|used| rooms.iter().any(|(other, _)| other == used)).collect(),
+                };
+                for used in used.iter().filter(|used| *used != room && !may_use.contains(used)) {
                     complaints.push(source.complaint(line_idx, &format!("`{room}` may not use `{used}`")));
                 }
             }
@@ -153,10 +178,11 @@ fn the_storage_engine_stays_behind_its_trait() {
 }
 
 #[test]
-fn use_cases_and_storage_know_no_http() {
+fn use_cases_records_and_storage_know_no_http() {
     let mut inner = sources("server/src/app");
+    inner.extend(sources("server/src/records"));
     inner.extend(sources("server/src/storage"));
-    check(forbid(&inner, &["axum::", "crate::handlers"]));
+    check(forbid(&inner, &["axum::", "utoipa::", "crate::handlers"]));
 }
 
 #[test]

@@ -1,0 +1,247 @@
+//! Questions by example: where in the serving map was a short recording made, or was it not made here?
+//!
+//! What such a question reads of a map version — profiles of everything driven, surfaces and free space of every
+//! component — is prepared at the end of the job that builds the version, and kept while there is room. A version that is
+//! not kept is prepared when it is asked about.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use locution_engine::config::EngineConfig;
+use locution_engine::geometry::Pose2;
+use locution_engine::locate::LocalizationState;
+use locution_engine::recall::{
+    Calibration, Example, FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive, RecallConfig,
+};
+use locution_engine::scan::ScanGeometry;
+use lru::LruCache;
+
+use crate::app::runs::NewBatch;
+use crate::app::site::Site;
+use crate::app::{App, AppError, on_blocking_thread};
+use crate::records::{Map, MapRun};
+
+/// Memory for prepared maps of all sites; the one asked about last is kept whatever it takes.
+const NUM_BYTES_KEPT_MAX: usize = 512 << 20;
+/// Keyframes read and drawn at once.
+const NUM_KEYFRAMES_PER_STEP: usize = 500;
+/// Probability from which on a place is the answer …
+const SURE_PROBABILITY: f64 = 0.9;
+/// … unless its pose can slide farther than this, one standard deviation, metres.
+const SURE_SD_MAX_M: f64 = 0.5;
+
+/// Site and map version.
+type IndexKey = (String, u64);
+
+/// Prepared maps, the latest used first.
+pub struct PlaceIndexes {
+    kept: Mutex<LruCache<IndexKey, Arc<PlaceIndex>>>,
+    /// Held while one is prepared: two questions must not prepare the same.
+    preparing: tokio::sync::Mutex<()>,
+}
+
+impl Default for PlaceIndexes {
+    fn default() -> Self {
+        Self { kept: Mutex::new(LruCache::unbounded()), preparing: tokio::sync::Mutex::default() }
+    }
+}
+
+impl PlaceIndexes {
+    fn get(&self, key: &IndexKey) -> Option<Arc<PlaceIndex>> {
+        self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned()
+    }
+
+    /// Keeps an index instead of older ones of its site, and lets go of the least used ones when they take too much.
+    fn put(&self, key: IndexKey, index: Arc<PlaceIndex>) {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let is_stale = |known: &IndexKey| known.0 == key.0 && known.1 < key.1;
+        let stale: Vec<IndexKey> =
+            kept.iter().map(|(known, _)| known).filter(|known| is_stale(known)).cloned().collect();
+        for known in stale {
+            kept.pop(&known);
+        }
+        kept.put(key, index);
+        let num_bytes = |kept: &LruCache<IndexKey, Arc<PlaceIndex>>| {
+            kept.iter().map(|(_, index)| index.num_bytes()).sum::<usize>()
+        };
+        while kept.len() > 1 && num_bytes(&kept) > NUM_BYTES_KEPT_MAX {
+            kept.pop_lru();
+        }
+    }
+}
+
+/// A place where a recording may have been made.
+#[derive(Clone, Debug)]
+pub struct ExamplePlace {
+    /// What the engine found.
+    pub found: FoundPlace,
+    /// The run that drove there.
+    pub run: String,
+    /// Probability; what is missing to 1 is that of being elsewhere.
+    pub probability: f64,
+}
+
+/// The answer of a site.
+#[derive(Clone, Debug)]
+pub struct ExampleInfo {
+    /// The site.
+    pub site: String,
+    /// The map version looked in.
+    pub map_version: u64,
+    /// Whether the recording was made here.
+    pub state: LocalizationState,
+    /// Metres that it drives.
+    pub travel_m: f64,
+    /// Likeliest first.
+    pub places: Vec<ExamplePlace>,
+}
+
+impl App {
+    /// Places of a short recording that is not stored, in each of some sites; the likeliest site first. Sites without a
+    /// map are passed over, unless there is but one.
+    ///
+    /// # Errors
+    /// Those of the storage; [`AppError::Invalid`] for scans that cannot be; [`AppError::NotReady`] for a single site
+    /// without a map.
+    pub async fn find_example(
+        &self,
+        sites: &[Arc<Site>],
+        geometry: &ScanGeometry,
+        batch: NewBatch,
+    ) -> Result<Vec<ExampleInfo>, AppError> {
+        let scans = Arc::new(batch.checked(geometry, 0, None, self.config().limits.odometry_step_max_m)?);
+        let mut answers = Vec::new();
+        let mut config = RecallConfig::default();
+        for site in sites {
+            let map = match site.map(None).await {
+                Err(AppError::NotReady { .. }) if sites.len() > 1 => continue,
+                map => map?,
+            };
+            let index = self.place_index(site, &map).await?;
+            let engine = Arc::clone(&site.state().config);
+            config = engine.recall.clone();
+            let (geometry, scans) = (geometry.clone(), Arc::clone(&scans));
+            let looking = on_blocking_thread(move || {
+                let example = Example::read(&engine.translator, &geometry, &scans, &engine.recall)?;
+                let travel_m = example.as_ref().map_or(0.0, Example::travel_m);
+                let found = example.map(|example| index.find(&example, &engine.recall));
+                Ok((travel_m, found.unwrap_or_default()))
+            });
+            let (travel_m, found) = looking.await?.map_err(invalid_geometry)?;
+            let run = |found: &FoundPlace| map.record.runs[found.earlier.run_idx as usize].name.clone();
+            let place = |found: FoundPlace| ExamplePlace { run: run(&found), found, probability: 0.0 };
+            answers.push(ExampleInfo {
+                site: site.name().to_string(),
+                map_version: map.record.version,
+                state: LocalizationState::Lost,
+                travel_m,
+                places: found.into_iter().map(place).collect(),
+            });
+        }
+        settle(&mut answers, &config);
+        Ok(answers)
+    }
+
+    /// What questions by example read of a map version.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub(in crate::app) async fn place_index(
+        &self,
+        site: &Site,
+        map: &Map,
+    ) -> Result<Arc<PlaceIndex>, AppError> {
+        let key = (site.name().to_string(), map.record.version);
+        if let Some(index) = self.place_indexes.get(&key) {
+            return Ok(index);
+        }
+        let _turn = self.place_indexes.preparing.lock().await;
+        if let Some(index) = self.place_indexes.get(&key) {
+            return Ok(index);
+        }
+        let config = Arc::clone(&site.state().config);
+        let index = Arc::new(prepare(map, &config).await?);
+        self.place_indexes.put(key, Arc::clone(&index));
+        Ok(index)
+    }
+}
+
+/// A laser that the engine refuses, said of the field that the client sent.
+pub(super) fn invalid_geometry(error: locution_engine::config_error::ConfigError) -> AppError {
+    AppError::invalid(error.field, error.problem)
+}
+
+/// Gives the places of all sites their probabilities, which compete with one another and with being nowhere.
+fn settle(answers: &mut [ExampleInfo], config: &RecallConfig) {
+    let log_odds: Vec<f64> =
+        answers.iter().flat_map(|answer| answer.places.iter().map(|place| place.found.log_odds)).collect();
+    let mut probabilities = Calibration::probabilities(&log_odds).into_iter();
+    for answer in answers.iter_mut() {
+        for (place, probability) in answer.places.iter_mut().zip(&mut probabilities) {
+            place.probability = probability;
+        }
+        let here: f64 = answer.places.iter().map(|place| place.probability).sum();
+        let is_sure = answer.places.first().is_some_and(|best| {
+            best.probability >= SURE_PROBABILITY && worst_sd_m(&best.found) <= SURE_SD_MAX_M
+        });
+        answer.state = match (is_sure, here > 0.5) {
+            (true, _) => LocalizationState::Converged,
+            (false, true) => LocalizationState::Ambiguous,
+            (false, false) => LocalizationState::Lost,
+        };
+        answer.places.retain(|place| place.probability >= config.min_probability);
+        answer.places.truncate(config.max_places);
+    }
+    let best = |answer: &ExampleInfo| answer.places.first().map_or(0.0, |place| place.probability);
+    answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
+}
+
+/// Standard deviation of a place in its worst direction, metres.
+fn worst_sd_m(found: &FoundPlace) -> f64 {
+    let (xx, xy, yy) = (found.covariance[(0, 0)], found.covariance[(0, 1)], found.covariance[(1, 1)]);
+    (0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy)).sqrt()
+}
+
+async fn prepare(map: &Map, config: &EngineConfig) -> Result<PlaceIndex, AppError> {
+    let mut builder = PlaceIndexBuilder::new(&config.recall);
+    for map_run in &map.record.runs {
+        builder = add_drive(map, map_run, builder).await?;
+    }
+    for placed in map.placed_runs(None).await? {
+        for first in (0..placed.poses.len()).step_by(NUM_KEYFRAMES_PER_STEP) {
+            let range = first..placed.poses.len().min(first + NUM_KEYFRAMES_PER_STEP);
+            let scans = placed.keyframe_scans(range.clone()).await?;
+            let (poses, geometry) = (placed.poses[range].to_vec(), placed.run.record.geometry.clone());
+            let component = placed.map_run.component;
+            builder = on_blocking_thread(move || {
+                for (pose, scan) in poses.iter().zip(&scans) {
+                    builder.add_scan(component, &geometry, &pose.map_from_robot, &scan.ranges_m);
+                }
+                builder
+            })
+            .await?;
+        }
+    }
+    on_blocking_thread(move || builder.finish()).await
+}
+
+/// Adds the text of a run as far as the map version knows it; a run outside the map adds nothing but its number.
+async fn add_drive(
+    map: &Map,
+    map_run: &MapRun,
+    mut builder: PlaceIndexBuilder,
+) -> Result<PlaceIndexBuilder, AppError> {
+    let run = map.reader().run(map_run.run).await?;
+    let observations = run.observations(0, map_run.num_labels as usize).await?;
+    let trajectory = map.trajectory(map_run).await?;
+    let component = map_run.component;
+    on_blocking_thread(move || {
+        let placed: Vec<Pose2> = observations
+            .iter()
+            .map_while(|there| trajectory.at(there.scan_seq, &there.run_from_robot))
+            .collect();
+        let known = &observations[..placed.len()];
+        builder.add_run(known, PlacedDrive { component, map_from_observations: placed });
+        builder
+    })
+    .await
+}

@@ -1,0 +1,5 @@
+//! Long work in the background: maps are built, texts are written anew when a site has outgrown its partition.
+
+mod build;
+mod regenerate;
+mod worker;

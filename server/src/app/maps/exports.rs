@@ -1,0 +1,172 @@
+//! Map versions in the formats of other tools.
+
+use locution_engine::formats::{GraphDocument, GrayImage, write_g2o};
+use locution_engine::geometry::Point2;
+use locution_engine::occupancy::{CellState, GridMap};
+use locution_engine::pose_graph::{InformationMatrix, PoseConstraint, PoseGraph};
+
+use super::matches::{MatchFilter, matches};
+use crate::app::runs::{Frame, StampedPose, trajectory};
+use crate::app::site::Site;
+use crate::app::{App, AppError, on_blocking_thread};
+use crate::picture::{Line, Panel, draw_png, draw_svg};
+use crate::records::{Map, PlacedRun};
+
+/// Components drawn in one picture, the largest first.
+const NUM_PANELS_MAX: usize = 12;
+
+/// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per verified match, and one
+/// `FIX` per component.
+///
+/// # Errors
+/// Those of the storage; [`AppError::Internal`] for a graph that cannot be.
+pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, AppError> {
+    let runs = map.placed_runs(component).await?;
+    let mut graph = PoseGraph::new();
+    let mut first_of_run = vec![None; map.record.runs.len()];
+    let mut fixed = std::collections::BTreeSet::new();
+    for placed in &runs {
+        let first = graph.poses().len() as u32;
+        first_of_run[placed.map_run.run as usize] = Some(first);
+        for pose in &placed.poses {
+            graph.add_pose(pose.map_from_robot).map_err(AppError::internal)?;
+        }
+        if fixed.insert(placed.map_run.component) {
+            graph.hold(first).map_err(AppError::internal)?;
+        }
+        add_motions(&mut graph, first, placed).await?;
+    }
+    for numbered in matches(map, &MatchFilter::verified(), 0, usize::MAX).await?.0 {
+        let found = numbered.found;
+        let firsts = [found.earlier.run_idx, found.later.run_idx].map(|run| first_of_run[run as usize]);
+        if let ([Some(earlier), Some(later)], Some(fit)) = (firsts, found.evidence.registration) {
+            let ends = (earlier + fit.earlier_keyframe, later + fit.later_keyframe);
+            add_edge(&mut graph, ends, fit.earlier_from_later, &fit.covariance);
+        }
+    }
+    Ok(write_g2o(&GraphDocument::numbered(graph)))
+}
+
+async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> Result<(), AppError> {
+    let keyframes = placed.run.stored_keyframes().await?;
+    let num_poses = placed.poses.len();
+    for (idx, two) in keyframes.windows(2).take(num_poses.saturating_sub(1)).enumerate() {
+        let motion = two[0].run_from_robot.between(&two[1].run_from_robot);
+        let ends = (first + idx as u32, first + idx as u32 + 1);
+        add_edge(graph, ends, motion, &two[1].motion_covariance);
+    }
+    Ok(())
+}
+
+/// Poses of every scan of every run of a component, or of all, in the order of the runs.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn map_trajectories(
+    site: &Site,
+    map: &Map,
+    component: Option<u32>,
+) -> Result<Vec<StampedPose>, AppError> {
+    let mut poses = Vec::new();
+    for run in &map.record.runs {
+        if run.num_poses > 0 && component.is_none_or(|component| component == run.component) {
+            let stored = map.reader().run(run.run).await?;
+            poses.extend(trajectory(site, &stored, Frame::Map, Some(map.record.version)).await?.poses);
+        }
+    }
+    Ok(poses)
+}
+
+/// A covariance that cannot be inverted brings no edge: the graph is for looking at, not for trusting blindly.
+fn add_edge(
+    graph: &mut PoseGraph,
+    (i, j): (u32, u32),
+    i_from_j: locution_engine::geometry::Pose2,
+    covariance: &[[f64; 3]; 3],
+) {
+    if let Ok(information) = InformationMatrix::from_covariance(covariance) {
+        let _ = graph.add_constraint(PoseConstraint { i, j, i_from_j, information });
+    }
+}
+
+/// The grey values of `map_server`: 254 free, 0 occupied, 205 unknown, the first row on top.
+pub fn gray_image(grid: &GridMap) -> GrayImage {
+    let gray = |cell: &CellState| match cell {
+        CellState::Free => 254,
+        CellState::Occupied => 0,
+        CellState::Unknown => 205,
+    };
+    let rows = grid.cells().chunks(grid.width()).rev();
+    GrayImage { width: grid.width(), height: grid.height(), pixels: rows.flatten().map(gray).collect() }
+}
+
+/// Which form a picture has.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PictureForm {
+    /// Pixels.
+    Png,
+    /// Vectors.
+    Svg,
+}
+
+impl App {
+    /// A picture of a version: walls, a colour per run, verified matches.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn picture(
+        &self,
+        site: &Site,
+        map: &Map,
+        component: Option<u32>,
+        form: PictureForm,
+    ) -> Result<Vec<u8>, AppError> {
+        let mut components: Vec<u32> =
+            map.record.runs.iter().filter(|run| run.num_poses > 0).map(|run| run.component).collect();
+        components.sort_unstable();
+        components.dedup();
+        components.retain(|known| component.is_none_or(|wanted| wanted == *known));
+        components.truncate(NUM_PANELS_MAX);
+        let mut drawn = Vec::new();
+        for component in components {
+            let grid = self.grid(site, map, component).await?;
+            drawn.push((grid, lines_of(map, component).await?));
+        }
+        let drawing = move || {
+            let panels: Vec<Panel<'_>> = drawn
+                .iter()
+                .map(|(grid, lines)| Panel { grid: grid.as_ref(), lines: lines.clone() })
+                .collect();
+            match form {
+                PictureForm::Png => draw_png(&panels),
+                PictureForm::Svg => Ok(draw_svg(&panels).into_bytes()),
+            }
+        };
+        on_blocking_thread(drawing).await?.map_err(AppError::internal)
+    }
+}
+
+/// Trajectories and verified matches of one component.
+async fn lines_of(map: &Map, component: u32) -> Result<Vec<Line>, AppError> {
+    let runs = map.placed_runs(Some(component)).await?;
+    let mut lines: Vec<Line> = Vec::new();
+    for numbered in matches(map, &MatchFilter::verified(), 0, usize::MAX).await?.0 {
+        let Some(fit) = numbered.found.evidence.registration else { continue };
+        let end = |run: u32, keyframe: u32| -> Option<Point2> {
+            let placed = runs.iter().find(|placed| placed.map_run.run == run)?;
+            Some(placed.poses.get(keyframe as usize)?.map_from_robot.position())
+        };
+        let ends = (
+            end(numbered.found.earlier.run_idx, fit.earlier_keyframe),
+            end(numbered.found.later.run_idx, fit.later_keyframe),
+        );
+        if let (Some(earlier), Some(later)) = ends {
+            lines.push(Line { run: None, points: vec![earlier, later] });
+        }
+    }
+    for placed in &runs {
+        let points = placed.poses.iter().map(|pose| pose.map_from_robot.position()).collect();
+        lines.push(Line { run: Some(placed.map_run.run as usize), points });
+    }
+    Ok(lines)
+}

@@ -1,0 +1,292 @@
+//! A batch of scans: checked, translated, stored in one commit, answered when durable.
+//!
+//! ```text
+//! batch ─► in sequence? ─► every scan possible? ─► translator (blocking thread) ─► scans, text, heads: one commit ─► receipt
+//! ```
+//!
+//! Batches are idempotent by sequence number. A batch whose scans are stored already is answered as it was then. One
+//! that overlaps what is stored must repeat it exactly; what goes beyond is appended. A gap or a difference is
+//! refused with the number that the run expects.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use locution_engine::geometry::Pose2;
+use locution_engine::scan::{Scan, ScanGeometry};
+
+use crate::app::site::{RunWriter, Site, WriterState};
+use crate::app::{App, AppError, Name, on_blocking_thread};
+use crate::records::{Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans};
+use crate::storage::Batch;
+
+/// Scans to append to a run.
+#[derive(Clone, Debug)]
+pub struct NewBatch {
+    /// Sequence number of the first scan.
+    pub first_sequence: u64,
+    /// In order; readings without a return are NaN or infinite.
+    pub scans: Vec<Scan>,
+}
+
+impl NewBatch {
+    /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
+    pub fn checked(
+        mut self,
+        geometry: &ScanGeometry,
+        num_known: usize,
+        before: Option<Pose2>,
+        step_max_m: f64,
+    ) -> Result<Vec<Scan>, AppError> {
+        check_readings(&mut self.scans, geometry)?;
+        let num_known = num_known.min(self.scans.len());
+        check_odometry(&self.scans, num_known, before, step_max_m)?;
+        Ok(self.scans.split_off(num_known))
+    }
+}
+
+impl App {
+    /// Appends a batch to a run; the answer means that it would survive a power cut.
+    ///
+    /// # Errors
+    /// [`AppError::Sequence`] for a gap or a differing overlap, [`AppError::Finished`], [`AppError::Invalid`] naming
+    /// the scan and the field, [`AppError::Busy`]. Nothing of the batch is stored then.
+    pub async fn append_batch(
+        self: &Arc<Self>,
+        site: Arc<Site>,
+        run: &Name,
+        batch: NewBatch,
+    ) -> Result<Receipt, AppError> {
+        let writer = site.writer(run, self.config().limits.num_batches_per_run_max).await?;
+        let app = Arc::clone(self);
+        // A task of its own: a client that hangs up must not stop a commit half way.
+        let work = async move {
+            let _place = writer.queue()?;
+            let _generation = site.serving.read().await;
+            let mut slot = writer.state.lock().await;
+            app.open_runs.used(&writer);
+            let mut state = app.wake(&site, &writer, slot.take()).await?;
+            let outcome = app.append_to(&site, &writer, &mut state, batch).await;
+            if leaves_state_whole(&outcome) {
+                *slot = Some(state);
+            }
+            outcome
+        };
+        tokio::spawn(work).await.map_err(AppError::internal)?
+    }
+
+    /// Ends a run: what the translator held back is brought out and stored.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn finish_run(self: &Arc<Self>, site: Arc<Site>, run: &Name) -> Result<Run, AppError> {
+        let writer = site.writer(run, self.config().limits.num_batches_per_run_max).await?;
+        let app = Arc::clone(self);
+        let for_task = Arc::clone(&site);
+        let work = async move {
+            let _place = writer.queue()?;
+            let _generation = for_task.serving.read().await;
+            let mut slot = writer.state.lock().await;
+            let mut state = app.wake(&for_task, &writer, slot.take()).await?;
+            if !state.head.value.is_finished {
+                finish(&for_task, &writer, &mut state).await?;
+                app.build_soon(&for_task);
+            }
+            Ok::<_, AppError>(())
+        };
+        tokio::spawn(work).await.map_err(AppError::internal)??;
+        site.run(run).await
+    }
+
+    /// The state in memory when it still is of the serving generation, else what is stored.
+    async fn wake(
+        &self,
+        site: &Site,
+        writer: &RunWriter,
+        state: Option<WriterState>,
+    ) -> Result<WriterState, AppError> {
+        match state {
+            Some(state) if state.generation == site.generation() => Ok(state),
+            _ => {
+                let state = site.state();
+                writer.load(site.store(), state.record.generation, &state.text_config()?).await
+            }
+        }
+    }
+
+    async fn append_to(
+        &self,
+        site: &Site,
+        writer: &RunWriter,
+        state: &mut WriterState,
+        mut batch: NewBatch,
+    ) -> Result<Receipt, AppError> {
+        let num_scans_max = self.config().limits.num_scans_per_batch_max;
+        if batch.scans.len() > num_scans_max {
+            let problem =
+                format!("{} scans are more than the {num_scans_max} allowed in a batch", batch.scans.len());
+            return Err(AppError::invalid("scans", problem));
+        }
+        let geometry = &writer.record.geometry;
+        check_readings(&mut batch.scans, geometry)?;
+        let num_repeated = repeated_scans(site, writer, &state.head.value, &batch).await?;
+        if num_repeated == batch.scans.len() {
+            return receipt_again(site, writer, state, &batch).await;
+        }
+        if state.head.value.is_finished {
+            let expected_sequence = state.head.value.next_sequence;
+            return Err(AppError::Finished { run: writer.record.name.clone(), expected_sequence });
+        }
+        let step_max_m = self.config().limits.odometry_step_max_m;
+        check_odometry(&batch.scans, num_repeated, state.head.value.last_odom_from_robot, step_max_m)?;
+        let fresh = batch.scans.split_off(num_repeated);
+        let interval = self.config().storage.num_scans_per_checkpoint;
+        append_fresh(site, writer, state, fresh, interval).await
+    }
+}
+
+/// Refusals that came before anything was changed leave the translator as it was.
+fn leaves_state_whole(outcome: &Result<Receipt, AppError>) -> bool {
+    matches!(
+        outcome,
+        Ok(_) | Err(AppError::Sequence { .. } | AppError::Finished { .. } | AppError::Invalid { .. })
+    )
+}
+
+/// Checks each reading and makes every way of saying "no return" NaN.
+fn check_readings(scans: &mut [Scan], geometry: &ScanGeometry) -> Result<(), AppError> {
+    for (scan_idx, scan) in scans.iter_mut().enumerate() {
+        let num_ranges = scan.ranges_m.len();
+        if num_ranges != geometry.num_ranges {
+            let problem = format!(
+                "scan {scan_idx} has {num_ranges} ranges, the run's geometry has {}",
+                geometry.num_ranges
+            );
+            return Err(AppError::invalid_scan(format!("scans[{scan_idx}].ranges_m"), problem));
+        }
+        for range_m in &mut scan.ranges_m {
+            if !range_m.is_finite() || f64::from(*range_m) >= geometry.range_max_m {
+                *range_m = f32::NAN;
+            }
+        }
+    }
+    Ok(())
+}
+
+/// A robot that is elsewhere from one scan to the next has lost its odometry; no text can bridge that.
+fn check_odometry(
+    scans: &[Scan],
+    first_fresh: usize,
+    before: Option<Pose2>,
+    step_max_m: f64,
+) -> Result<(), AppError> {
+    let mut before = before;
+    for (scan_idx, scan) in scans.iter().enumerate().skip(first_fresh) {
+        let step_m = before.map_or(0.0, |before| before.distance(&scan.odom_from_robot));
+        if step_m > step_max_m {
+            let problem = format!(
+                "scan {scan_idx} lies {step_m:.1} m from the scan before it, more than the {step_max_m} m a robot \
+                 moves between scans; start a new run after a jump of the odometry"
+            );
+            return Err(AppError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot"), problem));
+        }
+        before = Some(scan.odom_from_robot);
+    }
+    Ok(())
+}
+
+/// How many scans of the batch are stored already, being the same.
+async fn repeated_scans(
+    site: &Site,
+    writer: &RunWriter,
+    head: &RunHead,
+    batch: &NewBatch,
+) -> Result<usize, AppError> {
+    let expected_sequence = head.next_sequence;
+    let refuse = |detail: String| Err(AppError::Sequence { expected_sequence, detail });
+    if batch.first_sequence > expected_sequence {
+        return refuse(format!("scans {expected_sequence} to {} are missing", batch.first_sequence - 1));
+    }
+    let end = batch.first_sequence.saturating_add(batch.scans.len() as u64).min(expected_sequence);
+    let stored =
+        read_scans(site.store(), writer.idx, &writer.record.geometry, batch.first_sequence..end).await?;
+    match stored.iter().zip(&batch.scans).position(|(stored, sent)| !is_same_scan(stored, sent)) {
+        Some(idx) => {
+            let sequence = batch.first_sequence + idx as u64;
+            refuse(format!("scans[{idx}] differs from the stored scan of sequence number {sequence}"))
+        }
+        None => Ok(stored.len()),
+    }
+}
+
+/// The answer to a batch that is stored: the one it got then, or where the run stands when it was cut differently.
+async fn receipt_again(
+    site: &Site,
+    writer: &RunWriter,
+    state: &WriterState,
+    batch: &NewBatch,
+) -> Result<Receipt, AppError> {
+    let now = Receipt {
+        next_sequence: state.head.value.next_sequence,
+        num_observations: state.text.value.num_observations,
+        num_words: state.text.value.num_words_all_levels(),
+    };
+    if batch.scans.is_empty() {
+        return Ok(now);
+    }
+    let range = batch.first_sequence..batch.first_sequence + batch.scans.len() as u64;
+    Ok(find_receipt(site.store(), writer.idx, range).await?.unwrap_or(now))
+}
+
+/// Translates and stores scans that continue the run.
+async fn append_fresh(
+    site: &Site,
+    writer: &RunWriter,
+    state: &mut WriterState,
+    scans: Vec<Scan>,
+    checkpoint_interval: u64,
+) -> Result<Receipt, AppError> {
+    let started = Instant::now();
+    let num_scans = scans.len() as u64;
+    let first_sequence = state.head.value.next_sequence;
+    let run = writer.idx;
+    let mut translator = state.take_translator()?;
+    let (translator, scans, translated) = on_blocking_thread(move || {
+        let translated = translator.translate(&scans);
+        (translator, scans, translated)
+    })
+    .await?;
+    state.put_translator(translator);
+    let translated_s = started.elapsed().as_secs_f64();
+    let mut batch = Batch::default();
+    state.append_text(run, &translated, &mut batch);
+    state.head.value.next_sequence += num_scans;
+    state.head.value.last_odom_from_robot = scans.last().map(|scan| scan.odom_from_robot);
+    state.text.value.num_scans += num_scans;
+    let receipt = Receipt {
+        next_sequence: state.head.value.next_sequence,
+        num_observations: state.text.value.num_observations,
+        num_words: state.text.value.num_words_all_levels(),
+    };
+    append_scans(&mut batch, run, first_sequence, &scans, receipt);
+    state.append_checkpoint(run, checkpoint_interval, &mut batch)?;
+    let preconditions = state.append_heads(run, &mut batch);
+    site.store().commit(batch, preconditions).await?;
+    metrics::counter!("locution_scans_total").increment(num_scans);
+    metrics::counter!("locution_batches_total").increment(1);
+    metrics::histogram!("locution_translate_seconds").record(translated_s);
+    metrics::histogram!("locution_batch_seconds").record(started.elapsed().as_secs_f64());
+    Ok(receipt)
+}
+
+/// Stores the tail of a text. A finished run needs no translator again, so the stored one goes.
+async fn finish(site: &Site, writer: &RunWriter, state: &mut WriterState) -> Result<(), AppError> {
+    let translator = state.take_translator()?;
+    let translated = on_blocking_thread(move || translator.finish()).await?;
+    let mut batch = Batch::default();
+    state.append_text(writer.idx, &translated, &mut batch);
+    state.head.value.is_finished = true;
+    state.text.value.is_finished = true;
+    state.drop_checkpoint(writer.idx, &mut batch);
+    let preconditions = state.append_heads(writer.idx, &mut batch);
+    Ok(site.store().commit(batch, preconditions).await?)
+}
