@@ -69,7 +69,7 @@ pub struct MappingConfig {
     pub min_joining_share: f64,
     /// Largest standard deviation of the place of one run in the other, metres.
     pub max_joining_sd_m: f64,
-    /// Another way to join the same two maps must fit at less than this share of the anchors.
+    /// Another way to join the same two maps counts when it fits at this share of the anchors or more.
     pub max_ambiguity: f64,
     /// Profile candidates of two runs that are registered, the best first.
     pub max_candidates_per_pair: usize,
@@ -86,7 +86,7 @@ pub struct MappingConfig {
     pub max_contradiction: f64,
     /// A wrong way to lay a run over itself forbids a join when it reaches at least this share of the join's length …
     pub min_reach_over_null: f64,
-    /// … and is contradicted at most this many times as much.
+    /// … and is contradicted at most this many times as much; so does another way to join the same two.
     pub null_slack: f64,
 }
 
@@ -124,7 +124,7 @@ impl Default for MappingConfig {
             max_rounds: 8,
             max_chi2: 16.0,
             min_support: 2,
-            min_joining_anchors: 5,
+            min_joining_anchors: 12,
             min_joining_share: 0.7,
             max_joining_sd_m: 0.2,
             max_ambiguity: 0.7,
@@ -133,9 +133,9 @@ impl Default for MappingConfig {
             max_ways: 12,
             max_probes: 12,
             max_hypotheses: 5,
-            max_contradiction: 0.05,
-            min_reach_over_null: 0.8,
-            null_slack: 1.2,
+            max_contradiction: 0.065,
+            min_reach_over_null: 0.7,
+            null_slack: 1.25,
         }
     }
 }

@@ -202,27 +202,32 @@ fn judged<'a>(
     workshop: Workshop<'a>,
 ) -> Result<Verdict<'a>, PoseGraphError> {
     let config = workshop.site.config;
-    let mut holding: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
+    let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
     for way in ways.iter().take(config.max_hypotheses) {
-        let laid = Component::laid_over(host, guest, way, workshop)?;
-        holding.extend(
-            laid.filter(|(_, evidence)| evidence.holds(config)).map(|(both, evidence)| (evidence, both)),
-        );
+        let found = Component::laid_over(host, guest, way, workshop)?;
+        laid.extend(found.map(|(both, evidence)| (evidence, both)));
     }
-    holding.sort_by_key(|(evidence, _)| Reverse(evidence.num_anchors));
-    let mut holding = holding.into_iter();
-    let Some((best, both)) = holding.next() else { return Ok(Verdict::Apart(RejectionReason::Inconsistent)) };
-    if null.explains(&best, config) {
-        return Ok(Verdict::Apart(RejectionReason::Ambiguous));
-    }
+    let (mut holding, others): (Vec<_>, Vec<_>) =
+        laid.into_iter().partition(|(evidence, _)| evidence.holds(config));
+    holding.sort_by(|(a, _), (b, _)| a.one_sided_contradiction.total_cmp(&b.one_sided_contradiction));
+    let longest = holding.iter().map(|(evidence, _)| evidence.num_anchors).max().unwrap_or_default();
+    let reaches = |evidence: &JoinEvidence, least: usize| {
+        evidence.num_anchors as f64 >= config.max_ambiguity * least as f64
+    };
+    // A short stretch of corridor is contradicted by little.
+    let Some(place) = holding.iter().position(|(evidence, _)| reaches(evidence, longest)) else {
+        return Ok(Verdict::Apart(RejectionReason::Inconsistent));
+    };
+    let (best, both) = holding.swap_remove(place);
     if best.is_vetoed {
         return Ok(Verdict::Apart(RejectionReason::Vetoed));
     }
-    let is_rival = |(other, rival): (JoinEvidence, Component<'a>)| {
-        other.num_anchors as f64 > config.max_ambiguity * best.num_anchors as f64
-            && differ(&both, &rival, host, guest)
+    let is_rival = |(other, rival): &(JoinEvidence, Component<'a>)| {
+        reaches(other, best.num_anchors)
+            && other.one_sided_contradiction <= config.null_slack * best.one_sided_contradiction
+            && differ(&both, rival, host, guest)
     };
-    if holding.any(is_rival) {
+    if null.explains(&best, config) || holding.iter().chain(&others).any(is_rival) {
         return Ok(Verdict::Apart(RejectionReason::Ambiguous));
     }
     Ok(Verdict::Joined(Box::new(both)))
