@@ -10,7 +10,7 @@ use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::{Translation, Translator};
 use locution_lab::recordings::read_recording;
-use locution_lab::simulation::{PeopleConfig, SimulationConfig, Task, World, simulate_run};
+use locution_lab::simulation::{PeopleConfig, SimulationConfig, Task, simulate_run};
 use locution_lab::worlds::read_world;
 use serde::{Deserialize, Serialize};
 
@@ -32,36 +32,31 @@ pub struct Driven {
 impl Driven {
     /// A robot that wanders through a world of the data sets while people walk there.
     pub fn wandering(world: &str, length_m: f64, num_people: usize, seed: u64) -> Result<Self, Failure> {
-        let kept = cache_folder()?.join(format!("{world}-{length_m}-{num_people}-{seed}.postcard"));
-        if let Ok(bytes) = std::fs::read(&kept) {
-            return Ok(postcard::from_bytes(&bytes)?);
-        }
-        let people = PeopleConfig { num_people, ..PeopleConfig::default() };
-        let config = SimulationConfig { people, ..SimulationConfig::default() };
-        let task = Task::Wander { length_m, start: None };
-        let simulated = simulate_run(&self::world(world)?, &task, &config, seed)?;
-        let mut run = Self::translated(world, simulated.geometry.clone(), &simulated.scans)?;
-        let true_pose = |keyframe: &Keyframe| simulated.truth[keyframe.scan_seq as usize].truth_from_robot;
-        run.truth = run.keyframes.iter().map(true_pose).collect();
-        std::fs::write(&kept, postcard::to_allocvec(&run)?)?;
-        Ok(run)
+        kept(&format!("{world}-{length_m}-{num_people}-{seed}"), || {
+            let people = PeopleConfig { num_people, ..PeopleConfig::default() };
+            let config = SimulationConfig { people, ..SimulationConfig::default() };
+            let task = Task::Wander { length_m, start: None };
+            let drawn = read_world(&datasets().join("worlds").join(format!("{world}.yaml")))?;
+            let simulated = simulate_run(&drawn, &task, &config, seed)?;
+            let mut run = Self::translated(world, simulated.geometry.clone(), &simulated.scans)?;
+            let true_pose =
+                |keyframe: &Keyframe| simulated.truth[keyframe.scan_seq as usize].truth_from_robot;
+            run.truth = run.keyframes.iter().map(true_pose).collect();
+            Ok(run)
+        })
     }
 
     /// A recording of the data sets.
     pub fn recorded(name: &str) -> Result<Self, Failure> {
-        let kept = cache_folder()?.join(format!("{name}.postcard"));
-        if let Ok(bytes) = std::fs::read(&kept) {
-            return Ok(postcard::from_bytes(&bytes)?);
-        }
-        let path = datasets().join("laser").join(format!("{name}.log.gz"));
-        let log = read_recording(&path, CarmenOptions::default())?.log;
-        let run = Self::translated(name, log.geometry.clone(), &log.scans)?;
-        std::fs::write(&kept, postcard::to_allocvec(&run)?)?;
-        Ok(run)
+        kept(name, || {
+            let path = datasets().join("laser").join(format!("{name}.log.gz"));
+            let log = read_recording(&path, CarmenOptions::default())?.log;
+            Self::translated(name, log.geometry.clone(), &log.scans)
+        })
     }
 
     /// A recording as a server would translate it.
-    pub fn translated(place: &str, geometry: ScanGeometry, scans: &[Scan]) -> Result<Self, Failure> {
+    fn translated(place: &str, geometry: ScanGeometry, scans: &[Scan]) -> Result<Self, Failure> {
         let mut translator = Translator::new(&EngineConfig::default().translator, geometry.clone())?;
         let mut run = Self {
             place: place.to_owned(),
@@ -103,21 +98,23 @@ impl Driven {
     }
 }
 
-/// Where drives are kept between trials.
-fn cache_folder() -> Result<PathBuf, Failure> {
-    let folder = std::env::temp_dir().join("locution-drives");
+/// A drive that was kept, or made now and kept for the next trial.
+fn kept(name: &str, make: impl FnOnce() -> Result<Driven, Failure>) -> Result<Driven, Failure> {
+    let Some(folder) = std::env::var_os("LOCUTION_DRIVES").map(PathBuf::from) else { return make() };
+    let path = folder.join(format!("{name}.json"));
+    if let Ok(bytes) = std::fs::read(&path) {
+        return Ok(serde_json::from_slice(&bytes)?);
+    }
+    let run = make()?;
     std::fs::create_dir_all(&folder)?;
-    Ok(folder)
+    std::fs::write(&path, serde_json::to_vec(&run)?)?;
+    Ok(run)
 }
 
 /// Where the data sets are.
-pub fn datasets() -> PathBuf {
+fn datasets() -> PathBuf {
     std::env::var_os("LOCUTION_DATASETS").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/datasets"),
         PathBuf::from,
     )
-}
-
-fn world(name: &str) -> Result<World, Failure> {
-    Ok(read_world(&datasets().join("worlds").join(format!("{name}.yaml")))?)
 }

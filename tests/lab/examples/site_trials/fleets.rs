@@ -23,8 +23,9 @@ pub struct FleetReport {
     pub name: String,
     pub num_runs: usize,
     pub num_components: u32,
-    /// Pairs of runs of one component that the map puts elsewhere than the truth, and by how much.
-    pub false_joins: Vec<(usize, usize, f64)>,
+    /// Pairs of runs of one component that the map puts elsewhere than the truth, and by how much; nothing is known of
+    /// runs in different buildings.
+    pub false_joins: Vec<(usize, usize, Option<f64>)>,
     /// Pairs of runs in different components that share much, and how much.
     pub missed_joins: Vec<(usize, usize, f64)>,
     /// True when every robot can be reached from every other over neighbors that share enough.
@@ -32,14 +33,11 @@ pub struct FleetReport {
     pub seconds: f64,
 }
 
+/// Builds the map, and says how long that took.
 pub fn mapped(runs: &[Driven]) -> Result<(SiteMap, f64), Failure> {
     let records: Vec<RunRecord<'_>> = runs.iter().map(Driven::record).collect();
-    let config: EngineConfig = match std::env::var("LOCUTION_CONFIG") {
-        Ok(text) => serde_json::from_str(&text)?,
-        Err(_) => EngineConfig::default(),
-    };
     let began = Instant::now();
-    let map = map_site(&config.mapping, &records, &[], &mut RegistrationMemo::default())?;
+    let map = map_site(&EngineConfig::default().mapping, &records, &[], &mut RegistrationMemo::default())?;
     Ok((map, began.elapsed().as_secs_f64()))
 }
 
@@ -57,7 +55,7 @@ pub fn judged(name: &str, runs: &[Driven], map: &SiteMap, seconds: f64) -> Fleet
         for earlier in 0..later {
             let (a, b) = (&runs[earlier], &runs[later]);
             let is_joined = map.runs[earlier].component == map.runs[later].component;
-            let shared_m = if a.place == b.place { shared_m(a, b).min(shared_m_of(b, a)) } else { 0.0 };
+            let shared_m = if a.place == b.place { shared_m(a, b).min(shared_m(b, a)) } else { 0.0 };
             if shared_m >= MISSED_M {
                 let (from, to) = (reachable[later], reachable[earlier]);
                 reachable.iter_mut().filter(|root| **root == from).for_each(|root| *root = to);
@@ -66,9 +64,8 @@ pub fn judged(name: &str, runs: &[Driven], map: &SiteMap, seconds: f64) -> Fleet
                 }
             }
             if is_joined {
-                let error_m =
-                    if a.place == b.place { misplaced_m(runs, map, earlier, later) } else { f64::INFINITY };
-                if error_m > FALSE_M {
+                let error_m = (a.place == b.place).then(|| misplaced_m(runs, map, earlier, later));
+                if error_m.is_none_or(|error_m| error_m > FALSE_M) {
                     report.false_joins.push((earlier, later, error_m));
                 }
             }
@@ -79,13 +76,9 @@ pub fn judged(name: &str, runs: &[Driven], map: &SiteMap, seconds: f64) -> Fleet
 }
 
 /// Travel of `b` within reach of any place of `a`, metres.
-fn shared_m_of(a: &Driven, b: &Driven) -> f64 {
+fn shared_m(a: &Driven, b: &Driven) -> f64 {
     let is_near = |pose: &Pose2| a.truth.iter().any(|other| other.distance(pose) <= SHARED_M);
     b.truth.windows(2).filter(|pair| is_near(&pair[1])).map(|pair| pair[0].distance(&pair[1])).sum()
-}
-
-pub fn shared_m(a: &Driven, b: &Driven) -> f64 {
-    shared_m_of(a, b)
 }
 
 /// Median distance of a run from the truth when the map is laid over the truth by another run, whichever way is less.
@@ -105,7 +98,7 @@ fn misplaced_m(runs: &[Driven], map: &SiteMap, first: usize, second: usize) -> f
 }
 
 /// The rigid motion that lays poses best over the truth.
-pub fn world_from_map(truth: &[Pose2], poses: &[Pose2]) -> Pose2 {
+fn world_from_map(truth: &[Pose2], poses: &[Pose2]) -> Pose2 {
     let num = poses.len() as f64;
     let mean =
         |of: &[Pose2]| of.iter().fold((0.0, 0.0), |sum, pose| (sum.0 + pose.x / num, sum.1 + pose.y / num));

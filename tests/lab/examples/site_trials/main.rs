@@ -1,4 +1,14 @@
-//! Trials of the map builder with simulated robots: fleets, orders of making, growth (SPEC section 9).
+//! Trials of the map builder without a server: fleets, strangers, orders of making, growth (SPEC section 9).
+//!
+//! - `fleets 200 1 ipa-office-c stage-hospital`: three robots of 150 m with unknown starts in each world, two people
+//!   walking; false and missed joins. The numbers are the first seed and how many fleets of a world.
+//! - `strangers 200 ipa-lab-a ipa-office-a`: one robot in each world, all in one site; nothing may be joined.
+//! - `order recordings wean1 wean3 wean4`, `order fleet ipa-lab-a 200`: every order must give the same map.
+//! - `growth 5 ipa-lab-a`: so many runs of 80 m in a world and its furnished twin, three people walking.
+//!
+//! A line of JSON for every site, a sum at the end. `LOCUTION_DATASETS` says where worlds and recordings are;
+//! `LOCUTION_DRIVES` names a folder in which drives are kept, for trials of the map builder alone: empty it when
+//! simulation or translation change.
 
 mod driven;
 mod fleets;
@@ -9,7 +19,9 @@ use fleets::{FleetReport, judged, mapped};
 
 type Failure = anyhow::Error;
 
+/// Metres that each robot of a fleet drives.
 const LENGTH_M: f64 = 150.0;
+/// People who walk about meanwhile.
 const NUM_PEOPLE: usize = 2;
 
 fn main() -> Result<(), Failure> {
@@ -18,6 +30,7 @@ fn main() -> Result<(), Failure> {
         ["fleets", first_seed, num_fleets, worlds @ ..] => {
             all_fleets(first_seed.parse()?, num_fleets.parse()?, worlds)
         }
+        ["strangers", seed, worlds @ ..] => strangers(seed.parse()?, worlds),
         ["order", "recordings", names @ ..] => {
             let runs = names.iter().map(|name| Driven::recorded(name)).collect::<Result<Vec<_>, _>>()?;
             order::all_orders(&names.join(" "), &runs)
@@ -30,7 +43,9 @@ fn main() -> Result<(), Failure> {
             order::all_orders(&format!("{world} {first_seed}"), &runs)
         }
         ["growth", num_runs, world] => growth(num_runs.parse()?, world),
-        _ => Err(anyhow::anyhow!("say `fleets FIRST_SEED NUM WORLD…` or `growth RUNS WORLD`")),
+        _ => {
+            Err(anyhow::anyhow!("say fleets, strangers, order or growth; the head of the program tells how"))
+        }
     }
 }
 
@@ -42,11 +57,6 @@ fn all_fleets(first_seed: u64, num_fleets: u64, worlds: &[&str]) -> Result<(), F
             let runs = seeds
                 .map(|seed| Driven::wandering(world, LENGTH_M, NUM_PEOPLE, seed))
                 .collect::<Result<Vec<_>, _>>()?;
-            for (i, run) in runs.iter().enumerate() {
-                let t: Vec<[f32; 3]> =
-                    run.truth.iter().map(|p| [p.x as f32, p.y as f32, p.theta as f32]).collect();
-                eprintln!("TRUTH {i} {}", serde_json::to_string(&t)?);
-            }
             let (map, seconds) = mapped(&runs)?;
             let report = judged(&format!("{world} {}", first_seed + 3 * fleet), &runs, &map, seconds);
             println!("{}", serde_json::to_string(&report)?);
@@ -62,6 +72,17 @@ fn all_fleets(first_seed: u64, num_fleets: u64, worlds: &[&str]) -> Result<(), F
         count(&|report| report.should_be_one && report.num_components == 1),
         count(&|report| report.should_be_one)
     );
+    Ok(())
+}
+
+fn strangers(seed: u64, worlds: &[&str]) -> Result<(), Failure> {
+    let runs = worlds
+        .iter()
+        .map(|world| Driven::wandering(world, LENGTH_M, NUM_PEOPLE, seed))
+        .collect::<Result<Vec<_>, _>>()?;
+    let (map, seconds) = mapped(&runs)?;
+    let report = judged(&format!("strangers {seed}"), &runs, &map, seconds);
+    println!("{}", serde_json::to_string(&report)?);
     Ok(())
 }
 
