@@ -1,10 +1,12 @@
 //! Remembers registrations, so that a rebuild only computes what is new.
 
 use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::anchors::AnchorSet;
+use super::indices::AnchorIdx;
+use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
 
@@ -12,9 +14,9 @@ use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Request {
     /// Anchor of the earlier submap.
-    pub earlier: usize,
+    pub earlier: AnchorIdx,
     /// Anchor of the later submap.
-    pub later: usize,
+    pub later: AnchorIdx,
     /// Where to search.
     pub window: SearchWindow,
 }
@@ -22,27 +24,27 @@ pub(crate) struct Request {
 type Key = (u64, u64, [i32; 5]);
 
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub struct RegistrationMemo {
-    fits: HashMap<Key, Option<SubmapFit>>,
+    fits: Mutex<HashMap<Key, Option<SubmapFit>>>,
     config: Option<SubmapConfig>,
 }
 
 impl RegistrationMemo {
     /// Number of remembered registrations.
     pub fn len(&self) -> usize {
-        self.fits.len()
+        self.fits.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
 
     /// True when nothing is remembered.
     pub fn is_empty(&self) -> bool {
-        self.fits.is_empty()
+        self.len() == 0
     }
 
     /// Forgets everything when the settings are others than before.
     pub(crate) fn prepare(&mut self, config: &SubmapConfig) {
         if self.config.as_ref() != Some(config) {
-            self.fits.clear();
+            self.fits.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
             self.config = Some(config.clone());
         }
     }
@@ -50,26 +52,24 @@ impl RegistrationMemo {
     /// Answers in the order of the requests; what is not remembered is computed in parallel.
     ///
     /// Windows are rounded first, so that a map that moved a little asks the same question again.
-    pub(crate) fn answers(
-        &mut self,
-        requests: &[Request],
-        set: &AnchorSet,
-        config: &SubmapConfig,
-    ) -> Vec<Option<SubmapFit>> {
-        let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, set)).collect();
-        let mut missing: Vec<(Key, Request)> =
-            keyed.iter().filter(|(key, _)| !self.fits.contains_key(key)).copied().collect();
+    pub(crate) fn answers(&self, requests: &[Request], site: &SiteAnchors<'_>) -> Vec<Option<SubmapFit>> {
+        let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, site)).collect();
+        let mut missing: Vec<(Key, Request)> = {
+            let fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+            keyed.iter().filter(|(key, _)| !fits.contains_key(key)).copied().collect()
+        };
         missing.sort_by_key(|(key, _)| *key);
         missing.dedup_by_key(|(key, _)| *key);
         let computed: Vec<(Key, Option<SubmapFit>)> = missing
             .par_iter()
             .map(|(key, request)| {
-                let (earlier, later) = (&set.submaps[request.earlier], &set.submaps[request.later]);
-                (*key, register(earlier, later, &request.window, config))
+                let (earlier, later) = (site.submap(request.earlier), site.submap(request.later));
+                (*key, register(earlier, later, &request.window, &site.config.submap))
             })
             .collect();
-        self.fits.extend(computed);
-        keyed.iter().map(|(key, _)| self.fits.get(key).copied().flatten()).collect()
+        let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+        fits.extend(computed);
+        keyed.iter().map(|(key, _)| fits.get(key).copied().flatten()).collect()
     }
 }
 
@@ -77,7 +77,7 @@ impl RegistrationMemo {
 const GRAIN_M: f64 = 0.25;
 const GRAIN_RAD: f64 = 0.05;
 
-fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
+fn key_of(request: &Request, site: &SiteAnchors<'_>) -> (Key, Request) {
     let window = &request.window;
     let grains = [
         (window.center.x / GRAIN_M).round() as i32,
@@ -96,6 +96,7 @@ fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
         half_m: f64::from(grains[3]) * GRAIN_M,
         half_turn_rad: f64::from(grains[4]) * GRAIN_RAD,
     };
-    let key = (set.anchors[request.earlier].fingerprint, set.anchors[request.later].fingerprint, grains);
+    let name = |anchor| site.anchor(anchor).fingerprint;
+    let key = (name(request.earlier), name(request.later), grains);
     (key, Request { window, ..*request })
 }
