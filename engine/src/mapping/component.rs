@@ -11,6 +11,7 @@ use super::refusals::Refusal;
 use super::site_anchors::SiteAnchors;
 use super::ways::Way;
 use crate::pose_graph::PoseGraphError;
+use crate::registration::Opinions;
 
 /// Runs that share a frame.
 #[derive(Clone)]
@@ -68,6 +69,18 @@ impl<'a> Component<'a> {
             }
         }
         Ok(())
+    }
+
+    /// Share of the returns that its places contradict where it was driven again, in the direction in which it is less;
+    /// 0 when it never came back to a place.
+    pub fn own_contradiction(&self) -> f64 {
+        let site = self.graph.site;
+        let mut opinions = Opinions::default();
+        for Closure { earlier, later, .. } in &self.closures {
+            let relative = self.graph.pose(*earlier).between(&self.graph.pose(*later));
+            opinions += Opinions::of(site.submap(*earlier), site.submap(*later), &relative);
+        }
+        if self.closures.is_empty() { 0.0 } else { opinions.one_sided_contradiction() }
     }
 
     /// Two components in one frame as a way says, extended to wherever they then run beside each other, with what

@@ -42,6 +42,8 @@ pub struct MappingConfig {
     pub fit_floor_rad: f64,
     /// Share of opinions that must agree for submaps to fit.
     pub min_agreement: f64,
+    /// Between two runs submaps also fit when this share of the opinions about one of them agrees.
+    pub min_one_way_agreement: f64,
     /// Share of the returns about which the other submap must have an opinion.
     pub min_overlap: f64,
     /// Travel that must lie between two places of one run, metres.
@@ -84,6 +86,8 @@ pub struct MappingConfig {
     /// Share of the returns of one map that another may contradict where they overlap, in the direction in which it is
     /// less: furniture that came or went shows in one direction only, another building in both.
     pub max_contradiction: f64,
+    /// … or this many times the share in which the one of the two that contradicts itself less does so.
+    pub max_contradiction_over_own: f64,
     /// A wrong way to lay a run over itself forbids a join when it reaches at least this share of the join's length …
     pub min_reach_over_null: f64,
     /// … and is contradicted at most this many times as much; so does another way to join the same two.
@@ -114,6 +118,7 @@ impl Default for MappingConfig {
             fit_floor_m: 0.02,
             fit_floor_rad: 0.003,
             min_agreement: 0.8,
+            min_one_way_agreement: 0.9,
             min_overlap: 0.25,
             min_gap_m: 10.0,
             beside_m: 1.1,
@@ -133,7 +138,8 @@ impl Default for MappingConfig {
             max_ways: 12,
             max_probes: 12,
             max_hypotheses: 5,
-            max_contradiction: 0.065,
+            max_contradiction: 0.045,
+            max_contradiction_over_own: 1.4,
             min_reach_over_null: 0.7,
             null_slack: 1.25,
         }

@@ -33,9 +33,14 @@ pub(crate) struct GuidedRound {
     pub refused: Vec<Closure>,
 }
 
-/// True when the submaps of a fit agree as far as they overlap.
-pub(crate) fn is_fit(fit: &SubmapFit, config: &MappingConfig) -> bool {
-    fit.agreement >= config.min_agreement && fit.overlap >= config.min_overlap
+/// True when submaps of two visits agree as far as they overlap.
+///
+/// Between two places of one drive both must agree. Another drive may have been among people, or before the furniture
+/// came: then what the one saw of the other's returns is enough.
+pub(crate) fn is_fit(fit: &SubmapFit, is_one_drive: bool, config: &MappingConfig) -> bool {
+    let agrees = fit.agreement >= config.min_agreement
+        || (!is_one_drive && fit.one_way_agreement >= config.min_one_way_agreement);
+    agrees && fit.overlap >= config.min_overlap
 }
 
 /// Registers all neighbors of one graph that may be matched, and keeps the fits that agree with it and with each other.
@@ -55,8 +60,10 @@ pub(crate) fn guided_round(
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
     for (pair, fit) in neighbors.iter().zip(fits) {
-        let Some(fit) = fit.filter(|fit| is_fit(fit, config)) else { continue };
-        let closure = Closure { earlier: pair.request.earlier, later: pair.request.later, fit };
+        let Request { earlier, later, .. } = pair.request;
+        let is_one_drive = site.run_of(earlier) == site.run_of(later);
+        let Some(fit) = fit.filter(|fit| is_fit(fit, is_one_drive, config)) else { continue };
+        let closure = Closure { earlier, later, fit };
         let gate = pair.covariance + graph.with_floor(&fit.covariance) + slack();
         if deviation2(&pair.predicted, &fit.earlier_from_later, &gate) > config.max_chi2 {
             refused.push(closure);

@@ -25,6 +25,8 @@ pub(crate) struct JoinEvidence {
     /// The share of the returns that the one contradicts of what the other saw wherever they overlap, whichever way is
     /// less: furniture that came or went counts only one way.
     pub one_sided_contradiction: f64,
+    /// The same share between places of host or guest alone that were driven again, whichever contradicts itself less.
+    pub own_contradiction: f64,
     /// Guest anchors that lie beside one of the host.
     pub num_beside: usize,
     /// True when the joined map brings together what a person said are different places.
@@ -71,18 +73,21 @@ impl JoinEvidence {
             num_anchors: anchors.len(),
             share: tried.intersection(&anchors).count() as f64 / tried.len().max(1) as f64,
             worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
-            one_sided_contradiction: (opinions.of_later.contradiction())
-                .min(opinions.of_earlier.contradiction()),
+            one_sided_contradiction: opinions.one_sided_contradiction(),
+            own_contradiction: host.own_contradiction().min(guest.own_contradiction()),
             num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
             is_vetoed: workshop.judgements.contradict(graph, near_m, |anchor| guest.graph.holds(anchor)),
         }
     }
 
-    /// True when the joined map may stand.
+    /// True when the joined map may stand. Where host and guest both contradict themselves, because people crowd there or
+    /// what they saw is full of small things, the two may contradict each other a little more than that.
     pub fn holds(&self, config: &MappingConfig) -> bool {
+        let max_contradiction =
+            config.max_contradiction.max(config.max_contradiction_over_own * self.own_contradiction);
         self.num_anchors >= config.min_joining_anchors
             && self.share >= config.min_joining_share
             && self.worst_sd_m <= config.max_joining_sd_m
-            && self.one_sided_contradiction <= config.max_contradiction
+            && self.one_sided_contradiction <= max_contradiction
     }
 }

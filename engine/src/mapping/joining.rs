@@ -16,6 +16,7 @@ use super::null::Null;
 use super::place_match::{Channel, PlaceMatch, RejectionReason};
 use super::refusals::{Refusal, unfit_matches};
 use super::ways::{Groups, Registered, Way};
+use crate::geometry::Pose2;
 use crate::pose_graph::PoseGraphError;
 
 /// What joining made of the runs.
@@ -203,7 +204,7 @@ fn judged<'a>(
 ) -> Result<Verdict<'a>, PoseGraphError> {
     let config = workshop.site.config;
     let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
-    for way in ways.iter().take(config.max_hypotheses) {
+    for way in different(ways, guest).into_iter().take(config.max_hypotheses) {
         let found = Component::laid_over(host, guest, way, workshop)?;
         laid.extend(found.map(|(both, evidence)| (evidence, both)));
     }
@@ -233,12 +234,30 @@ fn judged<'a>(
     Ok(Verdict::Joined(Box::new(both)))
 }
 
+/// Ways that put the guest at different places; of those that put it at one place the first.
+fn different<'w>(ways: &'w [Way], guest: &Component<'_>) -> Vec<&'w Way> {
+    let anchors = guest.graph.anchors();
+    let Some(&middle) = anchors.get(anchors.len() / 2) else { return Vec::new() };
+    let place = |way: &Way| way.host_from_guest.compose(&guest.graph.pose(middle));
+    let mut chosen: Vec<&Way> = Vec::new();
+    for way in ways {
+        if chosen.iter().all(|other| are_apart(&place(other).between(&place(way)))) {
+            chosen.push(way);
+        }
+    }
+    chosen
+}
+
+/// True when two poses that differ by this are different places.
+fn are_apart(difference: &Pose2) -> bool {
+    difference.x.hypot(difference.y) > 1.0 || difference.theta.abs() > 0.2
+}
+
 /// True when two joined maps put the guest at different places.
 fn differ(a: &Component<'_>, b: &Component<'_>, host: &Component<'_>, guest: &Component<'_>) -> bool {
     let (Some(&host), Some(&guest)) = (host.graph.anchors().first(), guest.graph.anchors().first()) else {
         return false;
     };
     let relative = |both: &Component<'_>| both.graph.pose(host).between(&both.graph.pose(guest));
-    let difference = relative(a).between(&relative(b));
-    difference.x.hypot(difference.y) > 1.0 || difference.theta.abs() > 0.2
+    are_apart(&relative(a).between(&relative(b)))
 }

@@ -75,6 +75,6 @@ fn wrong_way(component: &Component<'_>, way: &Way) -> WrongWay {
     locals.iter().for_each(|local| opinions += local.opinions);
     WrongWay {
         num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
-        one_sided_contradiction: opinions.of_later.contradiction().min(opinions.of_earlier.contradiction()),
+        one_sided_contradiction: opinions.one_sided_contradiction(),
     }
 }

@@ -175,7 +175,7 @@ impl<'c> Groups<'c> {
             let fits = workshop.memo.answers(&requests, workshop.site);
             let mut fitting = Vec::new();
             for (claim, fit) in chosen.iter().zip(fits) {
-                match fit.filter(|fit| is_fit(fit, config)) {
+                match fit.filter(|fit| is_fit(fit, false, config)) {
                     Some(fit) => fitting.push(Fit::new(claim, fit)),
                     None => found.unfit.push(claim.candidate),
                 }
