@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::config_error::ConfigError;
-use crate::locate::LocalizationConfig;
+use crate::locate::{LocalizationConfig, SessionConfig};
 use crate::mapping::MappingConfig;
 use crate::matching::MatchingConfig;
 use crate::recall::RecallConfig;
@@ -29,6 +29,15 @@ pub struct EngineConfig {
 }
 
 impl EngineConfig {
+    /// What a localisation session needs of it.
+    pub fn session(&self) -> SessionConfig {
+        SessionConfig {
+            localizer: self.localization.localizer.clone(),
+            recall: self.recall.clone(),
+            translator: self.translator.clone(),
+        }
+    }
+
     /// Checks every value.
     ///
     /// # Errors

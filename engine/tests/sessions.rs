@@ -1,12 +1,15 @@
 //! Sessions in small buildings, scans cast from the map itself.
 
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 use locution_engine::geometry::{Point2, Pose2, angle_between};
 use locution_engine::locate::{
-    LikelihoodFieldConfig, LocalizationEstimate, LocalizationState, Localizer, LocalizerConfig, ServedMap,
+    LikelihoodFieldConfig, LocalizationEstimate, LocalizationState, Missing, PosePrior, ServedMap,
+    SessionConfig, SessionMap, SiteSession,
 };
 use locution_engine::occupancy::{CellState, GridMap, cast_ray};
+use locution_engine::recall::{PlaceIndexBuilder, RecallConfig};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_lab::small_building::{building, drive};
 
@@ -36,16 +39,26 @@ fn scans_along(map: &GridMap, poses: &[Pose2]) -> Vec<Scan> {
     poses.iter().map(|pose| sense(map, pose, poses[0].between(pose))).collect()
 }
 
-fn served(grid: GridMap) -> ServedMap {
-    ServedMap::build(grid, &LikelihoodFieldConfig::default())
+/// A map as robots at these poses saw it.
+fn seen(grid: &GridMap, poses: &[Pose2]) -> SessionMap {
+    let mut builder = PlaceIndexBuilder::new(&RecallConfig::default());
+    for pose in poses.iter().step_by(2) {
+        builder.add_scan(0, &laser(), pose, &sense(grid, pose, *pose).ranges_m);
+    }
+    let served = ServedMap::build(grid.clone(), &LikelihoodFieldConfig::default());
+    SessionMap { components: vec![(0, Arc::new(served))], index: Arc::new(builder.finish()) }
+}
+
+fn session(map: &SessionMap, prior: Option<PosePrior>) -> SiteSession {
+    SiteSession::new(laser(), Arc::new(SessionConfig::default()), map.clone(), prior)
 }
 
 /// The estimate after each scan.
-fn estimates(map: &ServedMap, scans: &[Scan]) -> Vec<LocalizationEstimate> {
-    let mut localizer = Localizer::new(laser(), LocalizerConfig::default());
+fn estimates(map: &SessionMap, scans: &[Scan]) -> Vec<LocalizationEstimate> {
+    let mut session = session(map, None);
     let estimate = |scan| {
-        localizer.push(map, scan);
-        localizer.estimate(map)
+        session.push(scan);
+        session.estimate()
     };
     scans.iter().map(estimate).collect()
 }
@@ -61,10 +74,12 @@ fn there_and_back() -> Vec<Pose2> {
 
 #[test]
 fn a_robot_that_wakes_up_is_found_where_it_is() {
-    let map = served(building());
     let poses = there_and_back();
-    let found = estimates(&map, &scans_along(&map.grid, &poses));
+    let scans = scans_along(&building(), &poses);
+    let map = seen(&building(), &poses);
+    let found = estimates(&map, &scans);
     assert_eq!(found[0].state, LocalizationState::Lost, "one scan is not enough");
+    assert_eq!(found[0].missing, [Missing::Travel]);
     let first_sure = found.iter().position(|estimate| estimate.state == LocalizationState::Converged);
     let first_sure = first_sure.expect("the building is not ambiguous");
     for (estimate, truth) in found.iter().zip(&poses).skip(first_sure) {
@@ -72,7 +87,7 @@ fn a_robot_that_wakes_up_is_found_where_it_is() {
         assert!(best.map_from_robot.distance(truth) < 0.3, "{best:?} is not {truth:?}");
         assert!(angle_between(best.map_from_robot.theta, truth.theta) < 0.1, "{best:?} is not {truth:?}");
     }
-    assert_eq!(estimates(&map, &scans_along(&map.grid, &poses)).last(), found.last(), "it can be repeated");
+    assert_eq!(estimates(&map, &scans).last(), found.last(), "it can be repeated");
 }
 
 #[test]
@@ -84,13 +99,42 @@ fn two_buildings_alike_stay_ambiguous() {
         both.set(column, row, *state);
         both.set(column + one.width() as i64, row, *state);
     }
-    let map = served(both);
-    for estimate in estimates(&map, &scans_along(&map.grid, &there_and_back())) {
+    let apart_m = one.width() as f64 * one.resolution_m();
+    let here = there_and_back();
+    let twin = here.iter().map(|pose| Pose2::new(pose.x + apart_m, pose.y, pose.theta));
+    let everywhere: Vec<Pose2> = here.iter().copied().chain(twin).collect();
+    let map = seen(&both, &everywhere);
+    let scans = scans_along(&both, &here);
+    let all = estimates(&map, &scans);
+    for estimate in &all {
         assert_ne!(estimate.state, LocalizationState::Converged, "{estimate:?}");
     }
-    let last = estimates(&map, &scans_along(&map.grid, &there_and_back())).pop().expect("scans were sent");
+    let last = all.last().expect("scans were sent");
     assert_eq!(last.state, LocalizationState::Ambiguous);
     assert_eq!(last.hypotheses.len(), 2, "{:?}", last.hypotheses);
+    assert!(last.missing.contains(&Missing::Alternatives), "{:?}", last.missing);
+
+    // What nobody can see, somebody may know.
+    let rough = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.1]];
+    let said = |pose: Pose2| PosePrior::new(0, pose, rough).expect("a covariance");
+    let mut told = session(&map, Some(said(here[0])));
+    scans.iter().for_each(|scan| told.push(scan));
+    let answer = told.estimate();
+    assert_eq!(answer.state, LocalizationState::Converged, "{answer:?}");
+    assert_eq!(answer.prior_agrees, Some(true));
+    assert!(answer.hypotheses[0].map_from_robot.distance(&here[here.len() - 1]) < 0.3, "{answer:?}");
+}
+
+#[test]
+fn a_declaration_that_is_wrong_is_contradicted() {
+    let poses = there_and_back();
+    let rough = [[0.2, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.0, 0.05]];
+    let wrong = PosePrior::new(0, Pose2::new(5.0, 11.0, 1.0), rough);
+    let mut misled = session(&seen(&building(), &poses), wrong);
+    scans_along(&building(), &poses).iter().for_each(|scan| misled.push(scan));
+    let answer = misled.estimate();
+    assert_eq!(answer.prior_agrees, Some(false), "{answer:?}");
+    assert!(answer.hypotheses[0].map_from_robot.distance(&poses[poses.len() - 1]) < 0.3, "{answer:?}");
 }
 
 #[test]
@@ -102,20 +146,25 @@ fn a_robot_elsewhere_is_never_found() {
         hall.set(column, row, if is_wall { CellState::Occupied } else { CellState::Free });
     }
     let poses: Vec<Pose2> = (0..120).map(|step| Pose2::new(-8.0 + 0.1 * f64::from(step), 1.5, 0.0)).collect();
-    let map = served(building());
-    for estimate in estimates(&map, &scans_along(&hall, &poses)) {
+    let map = seen(&building(), &there_and_back());
+    let all = estimates(&map, &scans_along(&hall, &poses));
+    for estimate in &all {
         assert_ne!(estimate.state, LocalizationState::Converged, "{estimate:?}");
+        let named: f64 = estimate.hypotheses.iter().map(|place| place.probability).sum();
+        assert!(named + estimate.probability_elsewhere < 1.0 + 1e-9, "{estimate:?}");
     }
+    let last = all.last().expect("scans were sent");
+    assert_eq!((last.state, last.probability_elsewhere > 0.5), (LocalizationState::Lost, true), "{last:?}");
 }
 
 #[test]
 fn a_robot_that_is_carried_away_is_found_again() {
-    let map = served(building());
     let poses = there_and_back();
-    let mut scans = scans_along(&map.grid, &poses);
+    let map = seen(&building(), &poses);
+    let mut scans = scans_along(&building(), &poses);
     // Odometry goes on as if nothing had happened, but the robot finds itself in the larger room.
     let offset = scans[scans.len() - 1].odom_from_robot;
-    let again = scans_along(&map.grid, &poses[60..]);
+    let again = scans_along(&building(), &poses[60..]);
     scans.extend(
         again.into_iter().map(|scan| Scan { odom_from_robot: offset.compose(&scan.odom_from_robot), ..scan }),
     );
@@ -131,7 +180,8 @@ fn a_robot_that_is_carried_away_is_found_again() {
 
 #[test]
 fn a_map_of_nothing_and_scans_of_nothing_are_survived() {
-    let map = served(GridMap::unknown(30, 30, 0.1, Point2::default()));
+    let nothing = GridMap::unknown(30, 30, 0.1, Point2::default());
+    let map = seen(&nothing, &[]);
     let blind = |step: i32| Scan {
         timestamp_ns: 0,
         odom_from_robot: Pose2::new(0.3 * f64::from(step), 0.0, 0.0),

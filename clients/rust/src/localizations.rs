@@ -3,7 +3,7 @@
 use crate::client::{Body, Client};
 use crate::error::ClientError;
 use crate::routes::{self, Query};
-use crate::types::{Localization, NewRun, Scan};
+use crate::types::{Localization, NewLocalization, Scan};
 use crate::upload::{Encoding, batch_body};
 
 impl Client {
@@ -11,8 +11,12 @@ impl Client {
     ///
     /// # Errors
     /// See [`ClientError`]; 409 before the first build.
-    pub async fn open_localization(&self, site: &str, robot: &NewRun) -> Result<Localization, ClientError> {
-        self.answer(&routes::OPEN_LOCALIZATION, &[site], &Query::default(), Body::json(robot)?).await
+    pub async fn open_localization(
+        &self,
+        site: &str,
+        new: &NewLocalization,
+    ) -> Result<Localization, ClientError> {
+        self.answer(&routes::OPEN_LOCALIZATION, &[site], &Query::default(), Body::json(new)?).await
     }
 
     /// A localisation as it stands.

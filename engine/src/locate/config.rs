@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::likelihood_field::LikelihoodFieldConfig;
-use super::localizer::LocalizerConfig;
+use super::localizer_config::LocalizerConfig;
 use crate::config_error::ConfigError;
 
 /// Settings of localisation sessions.

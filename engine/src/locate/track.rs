@@ -15,6 +15,8 @@ pub(super) struct Moment {
     pub run_from_robot: Pose2,
     /// What the laser saw.
     pub sweep: Sweep,
+    /// The same as it was sent.
+    pub ranges_m: Box<[f32]>,
 }
 
 /// How far a keyframe's motion may be off, metres and radians.
@@ -53,23 +55,18 @@ impl Track {
         self.agreements.push_back(moment.sweep.agreement(map, &self.map_from_robot));
     }
 
+    /// Forgets the oldest agreements beyond as many as there are moments; the newest moment may have none yet.
+    pub fn forget_before(&mut self, num_moments: usize) {
+        while self.agreements.len() > num_moments {
+            self.agreements.pop_front();
+        }
+    }
+
     /// Evidence that the robot is here rather than off the map, natural logarithm.
     pub fn evidence(&self, per_moment: f64, elsewhere: f64) -> f64 {
         self.agreements
             .iter()
             .map(|agreement| per_moment * (agreement.share - elsewhere) * agreement.coverage)
             .sum()
-    }
-
-    /// Mean agreement over the last moments, weighed by coverage, and mean coverage.
-    pub fn recent(&self, num_moments: usize) -> Agreement {
-        let (mut fits, mut known, mut count) = (0.0, 0.0, 0.0);
-        for agreement in self.agreements.iter().rev().take(num_moments) {
-            fits += agreement.share * agreement.coverage;
-            known += agreement.coverage;
-            count += 1.0;
-        }
-        let share = if known > 0.0 { fits / known } else { 0.0 };
-        Agreement { share, coverage: if count > 0.0 { known / count } else { 0.0 } }
     }
 }

@@ -149,6 +149,19 @@ impl GridMap {
         self.cells.iter().filter(|&&state| state == CellState::Free).count()
     }
 
+    /// The same with cells of twice the edge: a wall stays a wall, and what is known of a part is known.
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width.div_ceil(2), self.height.div_ceil(2));
+        let mut halved = Self::unknown(width, height, 2.0 * self.resolution_m, self.origin);
+        for (index, &state) in self.cells.iter().enumerate() {
+            let known = &mut halved.cells[index / self.width / 2 * width + index % self.width / 2];
+            if state == CellState::Occupied || *known == CellState::Unknown {
+                *known = state;
+            }
+        }
+        halved
+    }
+
     fn index(&self, column: i64, row: i64) -> Option<usize> {
         let is_inside = column >= 0 && row >= 0 && column < self.width as i64 && row < self.height as i64;
         is_inside.then(|| row as usize * self.width + column as usize)
@@ -195,6 +208,15 @@ mod tests {
         assert_eq!(map.state(0, 0), CellState::Occupied);
         assert_eq!(map.state(1, 0), CellState::Unknown);
         assert_eq!(map.num_free(), 2);
+    }
+
+    #[test]
+    fn half_as_many_cells_keep_walls() {
+        let map = GridMap::drawn(&["?..", "?#.", "?..", "??."], 0.5).halved();
+        assert_eq!((map.width(), map.height(), map.resolution_m()), (2, 2, 1.0));
+        assert_eq!(map.state(0, 1), CellState::Occupied);
+        assert_eq!(map.state(0, 0), CellState::Free);
+        assert_eq!(map.state(1, 0), CellState::Free);
     }
 
     #[test]

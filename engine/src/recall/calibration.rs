@@ -5,8 +5,30 @@ use serde::{Deserialize, Serialize};
 use crate::config_error::ConfigError;
 use crate::registration::AreaFit;
 
-/// Numbers that a place is judged by.
-pub const NUM_FEATURES: usize = 6;
+/// Numbers that say how a recording lies in a map.
+pub const NUM_FIT_FEATURES: usize = 7;
+/// Numbers that a place is judged by: those, and what proposed it.
+pub const NUM_FEATURES: usize = NUM_FIT_FEATURES + 2;
+
+/// How a recording lies in a map, in numbers of the order of one: one, what the two contradict of each other, how much
+/// of the recording the map knows, how exactly they fit, how far the recording saw beyond the map, how much there is.
+pub fn fit_features(fit: &AreaFit) -> [f64; NUM_FIT_FEATURES] {
+    [
+        1.0,
+        logit(fit.contradicted),
+        logit(fit.contradicts),
+        logit(fit.coverage),
+        logit(fit.exact),
+        logit(fit.beyond),
+        (f64::from(fit.num_opinions) / 1_000.0).max(0.01).ln(),
+    ]
+}
+
+/// Logarithm of the odds of a share, within bounds.
+fn logit(share: f64) -> f64 {
+    let share = share.clamp(0.002, 0.998);
+    (share / (1.0 - share)).ln()
+}
 
 /// What speaks for and against a place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,19 +48,10 @@ pub struct PlaceEvidence {
 impl PlaceEvidence {
     /// The numbers that the model weighs, each of the order of one.
     pub fn features(&self) -> [f64; NUM_FEATURES] {
-        let fit = &self.fit;
-        let logit = |share: f64| {
-            let share = share.clamp(0.002, 0.998);
-            (share / (1.0 - share)).ln()
-        };
-        [
-            1.0,
-            logit(fit.contradicted),
-            logit(fit.contradicts),
-            logit(fit.coverage),
-            logit(self.search_share),
-            self.resemblance,
-        ]
+        let mut features = [0.0; NUM_FEATURES];
+        features[..NUM_FIT_FEATURES].copy_from_slice(&fit_features(&self.fit));
+        features[NUM_FIT_FEATURES..].copy_from_slice(&[logit(self.search_share), self.resemblance]);
+        features
     }
 }
 
@@ -55,7 +68,7 @@ pub struct Calibration {
 
 impl Default for Calibration {
     fn default() -> Self {
-        Self { weights: [-10.0, -1.8, -1.8, 0.0, 0.5, 1.1] }
+        Self { weights: [-10.0, -1.8, -1.8, 0.0, 0.0, 0.0, 0.0, 0.5, 1.1] }
     }
 }
 

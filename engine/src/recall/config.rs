@@ -37,6 +37,10 @@ pub struct RecallConfig {
     pub max_places: usize,
     /// Places less probable are not answered.
     pub min_probability: f64,
+    /// Probability from which on a place is the answer …
+    pub sure_probability: f64,
+    /// … unless its pose can slide farther than this, one standard deviation, metres.
+    pub sure_sd_max_m: f64,
     /// From evidence to probability.
     pub calibration: Calibration,
 }
@@ -62,6 +66,8 @@ impl Default for RecallConfig {
             max_aligned: 4,
             max_places: 5,
             min_probability: 0.01,
+            sure_probability: 0.9,
+            sure_sd_max_m: 0.5,
             calibration: Calibration::default(),
         }
     }
@@ -81,6 +87,7 @@ impl RecallConfig {
             ("search_half_turn_rad", self.search_half_turn_rad),
             ("same_place_m", self.same_place_m),
             ("same_place_rad", self.same_place_rad),
+            ("sure_sd_max_m", self.sure_sd_max_m),
         ];
         for (field, value) in positive {
             if !(value > 0.0 && value < 100.0) {
@@ -99,8 +106,12 @@ impl RecallConfig {
                 return Err(ConfigError::new(format!("{path}.{field}"), "must lie in 1..=10000"));
             }
         }
-        if !(0.0..=1.0).contains(&self.min_probability) {
-            return Err(ConfigError::new(format!("{path}.min_probability"), "must lie in [0, 1]"));
+        for (field, value) in
+            [("min_probability", self.min_probability), ("sure_probability", self.sure_probability)]
+        {
+            if !(0.0..=1.0).contains(&value) {
+                return Err(ConfigError::new(format!("{path}.{field}"), "must lie in [0, 1]"));
+            }
         }
         self.calibration.validate(&format!("{path}.calibration"))
     }

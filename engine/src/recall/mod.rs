@@ -9,6 +9,7 @@
 //! Retrieval is cheap and often wrong, registration is dear and seldom wrong. What no place explains is not here: that
 //! answer takes part in the probabilities like a place of its own.
 
+mod answer;
 mod calibration;
 mod config;
 mod example;
@@ -19,7 +20,8 @@ mod recent_scans;
 #[cfg(test)]
 mod tests;
 
-pub use calibration::{Calibration, NUM_FEATURES, PlaceEvidence};
+pub use answer::{AnsweredPlace, ExampleAnswer, LocalizationState, settle, worst_sd_m};
+pub use calibration::{Calibration, NUM_FEATURES, NUM_FIT_FEATURES, PlaceEvidence, fit_features};
 pub use config::RecallConfig;
 pub use example::Example;
 pub use place_index::{FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive};

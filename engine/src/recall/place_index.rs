@@ -8,7 +8,7 @@ use super::config::RecallConfig;
 use super::example::{Example, OUTLINE, SKETCH};
 use super::proposals::{Proposal, proposals};
 use crate::geometry::{Point2, Pose2, angle_between};
-use crate::registration::{Area, AreaBuilder, AreaFit, AreaSearch, SearchWindow};
+use crate::registration::{Area, AreaBuilder, AreaFit, AreaSearch, SearchWindow, Submap, SubmapConfig};
 use crate::retrieval::{ProfileIndex, RunProfile};
 use crate::scan::ScanGeometry;
 use crate::text::{Direction, Interval, Observation};
@@ -140,6 +140,19 @@ impl PlaceIndex {
             .into_par_iter()
             .filter_map(|(seen, fit, log_odds)| self.answer(example, &seen, &fit, log_odds, config))
             .collect()
+    }
+
+    /// How a submap lies in a component near a pose; none where nothing is known, or of a component that is not kept.
+    pub fn fit(
+        &self,
+        component: u32,
+        submap: &Submap,
+        map_from_submap: &Pose2,
+        config: &SubmapConfig,
+    ) -> Option<AreaFit> {
+        let window =
+            SearchWindow { center: *map_from_submap, half_m: TAIL_WINDOW.0, half_turn_rad: TAIL_WINDOW.1 };
+        self.areas.get(component as usize)?.align(submap, map_from_submap, &window, config)
     }
 
     /// Searches around each place with some points of the recording.

@@ -29,6 +29,9 @@ const SURFACE_SHARE: f64 = 0.15;
 /// A cell takes no more points into its surface than this, so that sums stay small.
 const NUM_HITS_MAX: u8 = 200;
 
+/// Every how many cells, along rows and columns, free space of a recording is compared.
+const FREE_STRIDE: usize = 3;
+
 const UNKNOWN: u8 = 0;
 const FREE: u8 = 1;
 const BESIDE_SURFACE: u8 = 2;
@@ -169,6 +172,12 @@ pub struct AreaFit {
     pub contradicted: f64,
     /// Share of the map's surfaces, where the recording has an opinion, that it contradicts.
     pub contradicts: f64,
+    /// Of the returns that the map confirms, the share that ends in a surface and not just beside one.
+    pub exact: f64,
+    /// Share of the free space that the recording saw of which the map knows nothing.
+    pub beyond: f64,
+    /// Returns about which the map has an opinion.
+    pub num_opinions: u32,
 }
 
 impl AreaFit {
@@ -239,7 +248,25 @@ impl Area {
             coverage: f64::from(num_opinions) / submap.fine_points.len() as f64,
             contradicted: of_recording.contradiction(),
             contradicts: of_area.contradiction(),
+            exact: self.exact_share(&submap.fine_points, &pose, of_recording.num_confirmed),
+            beyond: self.unknown_share(&submap.evidence.free_points(FREE_STRIDE), &pose),
+            num_opinions,
         })
+    }
+
+    /// Share of the confirmed returns that end in a surface itself.
+    fn exact_share(&self, points: &[Point2], map_from_points: &Pose2, num_confirmed: u32) -> f64 {
+        let is_exact = |point: &Point2| self.state_at(point) == SURFACE;
+        let num_exact = transformed(points, map_from_points).iter().filter(|point| is_exact(point)).count();
+        num_exact as f64 / f64::from(num_confirmed.max(1))
+    }
+
+    /// Share of some points that nobody saw.
+    fn unknown_share(&self, points: &[Point2], map_from_points: &Pose2) -> f64 {
+        let is_unknown = |point: &Point2| self.state_at(point) == UNKNOWN;
+        let num_unknown =
+            transformed(points, map_from_points).iter().filter(|point| is_unknown(point)).count();
+        num_unknown as f64 / points.len().max(1) as f64
     }
 
     /// What the area says of a recording's returns.
@@ -303,12 +330,16 @@ impl Area {
 
     /// What is known at a point.
     fn at(&self, point: &Point2) -> CellEvidence {
-        let cell = cell_at(point.x, point.y, self.cell_m);
-        match self.index.get(&tile_of(cell)).map_or(UNKNOWN, |&tile| self.tiles[tile][offset_of(cell)]) {
+        match self.state_at(point) {
             UNKNOWN => CellEvidence::Unknown,
             FREE => CellEvidence::Free,
             _ => CellEvidence::Surface,
         }
+    }
+
+    fn state_at(&self, point: &Point2) -> u8 {
+        let cell = cell_at(point.x, point.y, self.cell_m);
+        self.index.get(&tile_of(cell)).map_or(UNKNOWN, |&tile| self.tiles[tile][offset_of(cell)])
     }
 
     /// Sets a cell to a state unless it has a higher one; cells of tiles that nobody saw stay unknown.

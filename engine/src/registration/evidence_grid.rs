@@ -92,6 +92,21 @@ impl EvidenceGrid {
         }
     }
 
+    /// Centres of cells that were seen free, of every `stride`-th row and column.
+    pub fn free_points(&self, stride: usize) -> Vec<Point2> {
+        let lattice = (0..self.side)
+            .step_by(stride)
+            .flat_map(|row| (0..self.side).step_by(stride).map(move |column| (column, row)));
+        let center = |cell: i32| f64::from(cell - self.half) * self.cell_m;
+        lattice
+            .filter(|&(column, row)| {
+                let index = (row * self.side + column) as usize;
+                self.hits[index] == 0 && self.passes[index] > 1
+            })
+            .map(|(column, row)| Point2::new(center(column), center(row)))
+            .collect()
+    }
+
     fn index_of(&self, x: f64, y: f64) -> Option<usize> {
         let column = (x / self.cell_m + 0.5).floor() as i32 + self.half;
         let row = (y / self.cell_m + 0.5).floor() as i32 + self.half;

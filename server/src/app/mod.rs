@@ -35,6 +35,8 @@ mod jobs;
 pub mod maps;
 mod names;
 pub mod runs;
+#[cfg(test)]
+mod script_tests;
 pub mod site;
 mod sites;
 

@@ -4,6 +4,7 @@
 //! - [`evaluation`]: the figures of the specification's reports, as pure functions
 //! - [`density_field`], [`particle_filter`]: Monte-Carlo localisation as the thesis has it (chapter 3)
 //! - [`thesis`]: its scenarios and tables
+//! - [`open_world`]: robots on maps of their own building, of a part of it, and of others, without a server
 //! - [`recordings`], [`worlds`], [`report`], [`plot`]: files in, tables and pictures out
 //!
 //! `examples/` holds programs that map recordings and worlds without a server, and a load generator.
@@ -11,6 +12,7 @@
 
 pub mod density_field;
 pub mod evaluation;
+pub mod open_world;
 pub mod particle_filter;
 pub mod plot;
 pub mod recordings;

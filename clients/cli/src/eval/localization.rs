@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use locution_client::{Client, Frame, LocalizationState, NewRun, Scan};
+use locution_client::{Client, Frame, LocalizationState, NewLocalization, Scan};
 use locution_engine::formats::{CarmenLog, CarmenOptions};
 use locution_engine::geometry::Pose2;
 use locution_lab::evaluation::{
@@ -201,7 +201,8 @@ async fn trial(
     limit_m: f64,
 ) -> Result<LocalizationTrial> {
     let recording = &log.recording;
-    let robot = NewRun { robot: Some("evaluation".into()), geometry: wire_geometry(&recording.log.geometry) };
+    let geometry = wire_geometry(&recording.log.geometry);
+    let robot = NewLocalization { robot: Some("evaluation".into()), geometry, prior: None };
     let opened = client.open_localization(SITE, &robot).await.context("a localisation cannot be opened")?;
     let mut next = start;
     let mut answered = None;

@@ -30,6 +30,8 @@ enum What {
     Localization(localization::LocalizationArguments),
     /// Short recordings that are not stored: found in the map, or honestly not here.
     Query(query::QueryArguments),
+    /// Robots on maps of their own building, of a part of it, and of others, without a server: ever wrongly sure, found.
+    OpenWorld(locution_lab::open_world::OpenWorldArguments),
     /// Pose graphs with forged closures: how often the optimizer is not misled.
     Robust(robust::RobustArguments),
     /// The thesis' experiments in scenarios of the same kind, beside the published numbers.
@@ -49,6 +51,7 @@ pub fn run(arguments: &EvalArguments) -> Result<()> {
             What::Labels(arguments) => labels::run(arguments).await,
             What::Localization(arguments) => localization::run(arguments).await,
             What::Query(arguments) => query::run(arguments).await,
+            What::OpenWorld(arguments) => locution_lab::open_world::run(arguments),
             What::Robust(arguments) => robust::run(arguments),
             What::Thesis(arguments) => locution_lab::thesis::run(arguments),
         }

@@ -14,6 +14,7 @@ use serde::Serialize;
 use super::local_server::{LocalServer, SITE};
 use super::localization::{Known, MAPPED_M, MapAndLog, build, expected_pose, travel};
 use crate::wire::{wire_geometry, wire_scan};
+use locution_lab::plot::{Line, Plot};
 use locution_lab::recordings::read_recording;
 use locution_lab::report::write_json;
 
@@ -34,7 +35,7 @@ pub struct QueryArguments {
     /// JSON file with the engine's configuration, whole or in part [default: the defaults].
     #[arg(long)]
     config: Option<PathBuf>,
-    /// Write the report here.
+    /// Write the report here, and beside it the reliability diagram as a picture.
     #[arg(long)]
     json: Option<PathBuf>,
 }
@@ -84,6 +85,9 @@ pub(super) async fn run(arguments: &QueryArguments) -> Result<()> {
     print_report(&report);
     if let Some(path) = &arguments.json {
         write_json(path, &report)?;
+        let picture = path.with_extension("png");
+        std::fs::write(&picture, reliability_picture(&report)?)?;
+        println!("wrote {}", picture.display());
     }
     server.stop().await
 }
@@ -137,6 +141,33 @@ async fn ask(
     })
 }
 
+/// What was right over what was said; on the diagonal it is the same.
+fn reliability_picture(report: &Report) -> Result<Vec<u8>> {
+    let bins = &report.examples.reliability;
+    Plot {
+        title: format!("pieces of {} m on {}", report.length_m, report.map_from),
+        x_label: "probability said".into(),
+        y_label: "share that was right".into(),
+        x_range: (0.0, 1.0),
+        y_range: (0.0, 1.0),
+        lines: vec![
+            Line {
+                name: "calibrated".into(),
+                color: [160, 160, 160],
+                points: vec![(0.0, 0.0), (1.0, 1.0)],
+                has_markers: false,
+            },
+            Line {
+                name: "answered".into(),
+                color: [31, 119, 180],
+                points: bins.iter().map(|bin| (bin.said, bin.right)).collect(),
+                has_markers: true,
+            },
+        ],
+    }
+    .to_png()
+}
+
 fn print_report(report: &Report) {
     let percent = |share: f64| format!("{:.1} %", 100.0 * share);
     let result = &report.examples;
@@ -149,10 +180,14 @@ fn print_report(report: &Report) {
         percent(result.first_right),
         percent(result.found)
     );
+    println!("  here: a right place among the first five {}", percent(result.among_first_five));
     println!("  here: sure and wrong    {}", percent(result.wrongly_sure));
     println!("  elsewhere: \"not here\"   {}", percent(result.not_here));
     println!("  elsewhere: sure         {}", percent(result.sure_elsewhere));
-    println!("  probability said and share that was right (Brier score {:.3}):", result.brier);
+    println!(
+        "  probability said and share that was right (calibration error {:.3}, Brier score {:.3}):",
+        result.calibration_error, result.brier
+    );
     for bin in &result.reliability {
         println!("    {:.2}  {:.2} of {}", bin.said, bin.right, bin.places);
     }

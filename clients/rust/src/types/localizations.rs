@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::matches::Channel;
+use super::runs::Geometry;
 use super::values::{Direction, Pose};
 
 /// How sure an answer is.
@@ -45,6 +46,54 @@ pub struct Localization {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<Hypothesis>,
+    /// Probability that the robot is not in this map; with those of all places 1.
+    pub probability_elsewhere: f64,
+    /// What is missing to be found; empty when it is.
+    pub missing: Vec<Missing>,
+    /// Whether the likeliest place is the one that was declared.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior_agrees: Option<bool>,
+}
+
+/// What is missing before a robot counts as found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Missing {
+    /// Too little was driven.
+    Travel,
+    /// That the robot is not in this map is too probable.
+    Elsewhere,
+    /// Another place of the map is too probable.
+    Alternatives,
+    /// The best place has not been the best one for long enough.
+    Persistence,
+    /// What was seen last contradicts the best place.
+    RecentScans,
+    /// The pose could slide too far, as it can along a plain corridor.
+    Position,
+}
+
+/// A rough pose that is declared; it is weighed, not believed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PosePrior {
+    /// The component of the map whose frame the pose is in.
+    pub component: u32,
+    /// Where.
+    pub map_from_robot: Pose,
+    /// Covariance of (x, y, θ), row by row.
+    pub covariance: [[f64; 3]; 3],
+}
+
+/// Opens a localisation: a robot, its laser, and what is known of where it is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NewLocalization {
+    /// The robot, for the log.
+    pub robot: Option<String>,
+    /// The laser.
+    pub geometry: Geometry,
+    /// Where the robot is said to be when the session begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PosePrior>,
 }
 
 /// What speaks for and against a place, by the stage that found it.
@@ -100,4 +149,6 @@ pub struct ExampleAnswer {
     pub travel_m: f64,
     /// Places where the robot was at the end of the example, likeliest first.
     pub places: Vec<ExamplePlace>,
+    /// Probability that the example was not made in this site.
+    pub probability_elsewhere: f64,
 }

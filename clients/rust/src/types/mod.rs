@@ -13,7 +13,8 @@ mod values;
 
 pub use jobs::{Job, JobKind, JobState};
 pub use localizations::{
-    ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState,
+    ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState, Missing,
+    NewLocalization, PosePrior,
 };
 pub use maps::{
     Change, ChangeKind, Component, Connection, ConnectionKind, Grid, GridInfo, KeyframePose, Label,

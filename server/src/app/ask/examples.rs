@@ -8,9 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
-use locution_engine::locate::LocalizationState;
 use locution_engine::recall::{
-    Calibration, Example, FoundPlace, PlaceIndex, PlaceIndexBuilder, PlacedDrive, RecallConfig,
+    Example, ExampleAnswer, PlaceIndex, PlaceIndexBuilder, PlacedDrive, RecallConfig, settle,
 };
 use locution_engine::scan::ScanGeometry;
 use lru::LruCache;
@@ -24,10 +23,6 @@ use crate::records::{Map, MapRun};
 const NUM_BYTES_KEPT_MAX: usize = 512 << 20;
 /// Keyframes read and drawn at once.
 const NUM_KEYFRAMES_PER_STEP: usize = 500;
-/// Probability from which on a place is the answer …
-const SURE_PROBABILITY: f64 = 0.9;
-/// … unless its pose can slide farther than this, one standard deviation, metres.
-const SURE_SD_MAX_M: f64 = 0.5;
 
 /// Site and map version.
 type IndexKey = (String, u64);
@@ -69,17 +64,6 @@ impl PlaceIndexes {
     }
 }
 
-/// A place where a recording may have been made.
-#[derive(Clone, Debug)]
-pub struct ExamplePlace {
-    /// What the engine found.
-    pub found: FoundPlace,
-    /// The run that drove there.
-    pub run: String,
-    /// Probability; what is missing to 1 is that of being elsewhere.
-    pub probability: f64,
-}
-
 /// The answer of a site.
 #[derive(Clone, Debug)]
 pub struct ExampleInfo {
@@ -87,12 +71,12 @@ pub struct ExampleInfo {
     pub site: String,
     /// The map version looked in.
     pub map_version: u64,
-    /// Whether the recording was made here.
-    pub state: LocalizationState,
     /// Metres that it drives.
     pub travel_m: f64,
-    /// Likeliest first.
-    pub places: Vec<ExamplePlace>,
+    /// The runs of the map, by their number.
+    pub runs: Vec<String>,
+    /// What is said of the recording.
+    pub answer: ExampleAnswer,
 }
 
 impl App {
@@ -109,7 +93,7 @@ impl App {
         batch: NewBatch,
     ) -> Result<Vec<ExampleInfo>, AppError> {
         let scans = Arc::new(batch.checked(geometry, 0, None, self.config().limits.odometry_step_max_m)?);
-        let mut answers = Vec::new();
+        let (mut answers, mut found_by_site) = (Vec::new(), Vec::new());
         let mut config = RecallConfig::default();
         for site in sites {
             let map = match site.map(None).await {
@@ -127,17 +111,20 @@ impl App {
                 Ok((travel_m, found.unwrap_or_default()))
             });
             let (travel_m, found) = looking.await?.map_err(invalid_geometry)?;
-            let run = |found: &FoundPlace| map.record.runs[found.earlier.run_idx as usize].name.clone();
-            let place = |found: FoundPlace| ExamplePlace { run: run(&found), found, probability: 0.0 };
+            found_by_site.push(found);
             answers.push(ExampleInfo {
                 site: site.name().to_string(),
                 map_version: map.record.version,
-                state: LocalizationState::Lost,
                 travel_m,
-                places: found.into_iter().map(place).collect(),
+                runs: map.record.runs.iter().map(|run| run.name.clone()).collect(),
+                answer: ExampleAnswer::default(),
             });
         }
-        settle(&mut answers, &config);
+        for (info, answer) in answers.iter_mut().zip(settle(found_by_site, &config)) {
+            info.answer = answer;
+        }
+        let best = |info: &ExampleInfo| info.answer.places.first().map_or(0.0, |place| place.probability);
+        answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
         Ok(answers)
     }
 
@@ -168,37 +155,6 @@ impl App {
 /// A laser that the engine refuses, said of the field that the client sent.
 pub(super) fn invalid_geometry(error: locution_engine::config_error::ConfigError) -> AppError {
     AppError::invalid(error.field, error.problem)
-}
-
-/// Gives the places of all sites their probabilities, which compete with one another and with being nowhere.
-fn settle(answers: &mut [ExampleInfo], config: &RecallConfig) {
-    let log_odds: Vec<f64> =
-        answers.iter().flat_map(|answer| answer.places.iter().map(|place| place.found.log_odds)).collect();
-    let mut probabilities = Calibration::probabilities(&log_odds).into_iter();
-    for answer in answers.iter_mut() {
-        for (place, probability) in answer.places.iter_mut().zip(&mut probabilities) {
-            place.probability = probability;
-        }
-        let here: f64 = answer.places.iter().map(|place| place.probability).sum();
-        let is_sure = answer.places.first().is_some_and(|best| {
-            best.probability >= SURE_PROBABILITY && worst_sd_m(&best.found) <= SURE_SD_MAX_M
-        });
-        answer.state = match (is_sure, here > 0.5) {
-            (true, _) => LocalizationState::Converged,
-            (false, true) => LocalizationState::Ambiguous,
-            (false, false) => LocalizationState::Lost,
-        };
-        answer.places.retain(|place| place.probability >= config.min_probability);
-        answer.places.truncate(config.max_places);
-    }
-    let best = |answer: &ExampleInfo| answer.places.first().map_or(0.0, |place| place.probability);
-    answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
-}
-
-/// Standard deviation of a place in its worst direction, metres.
-fn worst_sd_m(found: &FoundPlace) -> f64 {
-    let (xx, xy, yy) = (found.covariance[(0, 0)], found.covariance[(0, 1)], found.covariance[(1, 1)]);
-    (0.5 * (xx + yy) + (0.5 * (xx - yy)).hypot(xy)).sqrt()
 }
 
 async fn prepare(map: &Map, config: &EngineConfig) -> Result<PlaceIndex, AppError> {

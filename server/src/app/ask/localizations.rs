@@ -1,19 +1,14 @@
 //! "Where am I": sessions that are fed like runs and stored nowhere.
 //!
-//! A session looks for the robot in every component of the map version that served when it began, up to a few. While
-//! the robot is not found, its last metres are also asked about like an example, and the places answered are judged with
-//! those of the search. Each component says how its best places compare with being off the map; that common yardstick
-//! makes their probabilities comparable.
+//! A session looks for the robot in every component of the map version that served when it began, up to a few. What it
+//! searches, weighs and says is [`SiteSession`]'s; here are only the table of sessions and what they read of the store.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
-use locution_engine::locate::{LocalizationState, Localizer, ServedMap};
-use locution_engine::occupancy::{CellState, GridMap};
-use locution_engine::recall::{Example, FoundPlace, PlaceIndex, RecentScans};
+use locution_engine::locate::{LocalizationEstimate, PosePrior, ServedMap, SessionMap, SiteSession};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
 
@@ -27,23 +22,6 @@ use crate::records::Map;
 const NUM_COMPONENTS_MAX: usize = 4;
 /// A session without scans for so long is forgotten.
 const IDLE_MAX: Duration = Duration::from_secs(900);
-/// A robot that is not found asks where its last metres were driven each time it has driven so far, metres.
-const RECALL_EVERY_M: f64 = 3.0;
-/// Odds of a place against "off the map" are cut here, so that they stay numbers.
-const ODDS_MAX: f64 = 1e6;
-
-/// A place where the robot may be.
-#[derive(Clone, Debug)]
-pub struct LocatedHypothesis {
-    /// The component whose frame the pose is in.
-    pub component: u32,
-    /// Where the robot may be now.
-    pub map_from_robot: Pose2,
-    /// Covariance of (x, y, θ), row by row.
-    pub covariance: [[f64; 3]; 3],
-    /// Probability that it is there; what is missing to 1 is that of being elsewhere.
-    pub probability: f64,
-}
 
 /// The answer of a session.
 #[derive(Clone, Debug)]
@@ -52,14 +30,10 @@ pub struct LocalizationInfo {
     pub id: u64,
     /// The map version it looks in.
     pub map_version: u64,
-    /// Whether the robot is found.
-    pub state: LocalizationState,
     /// The sequence number to send next.
     pub next_sequence: u64,
-    /// Metres driven since it began.
-    pub travel_m: f64,
-    /// Likeliest first.
-    pub hypotheses: Vec<LocatedHypothesis>,
+    /// What it says.
+    pub estimate: LocalizationEstimate,
 }
 
 /// The sessions of this process.
@@ -82,113 +56,24 @@ struct Session {
     search: tokio::sync::Mutex<Search>,
 }
 
-/// One localizer per component, fed with the same scans.
+/// A session of the engine and how far it was fed.
 #[derive(Clone)]
-pub(super) struct Search {
-    parts: Vec<(u32, Arc<ServedMap>, Localizer)>,
-    memory: Memory,
+struct Search {
+    session: SiteSession,
     next_sequence: u64,
     latest_odom: Option<Pose2>,
 }
 
 impl Search {
     fn push(&mut self, scans: &[Scan]) {
-        for scan in scans {
-            self.parts.iter_mut().for_each(|(_, map, localizer)| localizer.push(map, scan));
-            self.memory.recent.push(scan);
-        }
-        if self.is_recall_due() {
-            self.recall();
-        }
+        scans.iter().for_each(|scan| self.session.push(scan));
         self.next_sequence += scans.len() as u64;
         self.latest_odom = scans.last().map(|scan| scan.odom_from_robot).or(self.latest_odom);
-    }
-
-    fn travel_m(&self) -> f64 {
-        self.parts.first().map_or(0.0, |(_, _, localizer)| localizer.travel_m())
-    }
-
-    fn is_recall_due(&self) -> bool {
-        let is_found =
-            self.parts.iter().any(|(_, _, localizer)| localizer.state() == LocalizationState::Converged);
-        !is_found && self.travel_m() >= self.memory.recalled_at_m + RECALL_EVERY_M
-    }
-
-    /// Asks where the last metres were driven, and proposes the answers.
-    fn recall(&mut self) {
-        self.memory.recalled_at_m = self.travel_m();
-        for found in self.memory.places() {
-            let part = self.parts.iter_mut().find(|(component, ..)| *component == found.component);
-            if let Some((_, map, localizer)) = part {
-                localizer.propose(map, &found.map_from_robot);
-            }
-        }
-    }
-
-    fn estimate(&self) -> (LocalizationState, f64, Vec<LocatedHypothesis>) {
-        let estimates: Vec<_> = self
-            .parts
-            .iter()
-            .map(|(component, map, localizer)| (*component, localizer.estimate(map)))
-            .collect();
-        let mut odds_sum = 0.0;
-        let mut hypotheses = Vec::new();
-        for (component, estimate) in &estimates {
-            let elsewhere = 1.0 - estimate.hypotheses.iter().map(|found| found.probability).sum::<f64>();
-            for found in &estimate.hypotheses {
-                let odds = (found.probability / elsewhere.max(1e-9)).min(ODDS_MAX);
-                odds_sum += odds;
-                hypotheses.push(LocatedHypothesis {
-                    component: *component,
-                    map_from_robot: found.map_from_robot,
-                    covariance: found.covariance,
-                    probability: odds,
-                });
-            }
-        }
-        hypotheses.iter_mut().for_each(|found| found.probability /= 1.0 + odds_sum);
-        hypotheses.sort_by(|a, b| b.probability.total_cmp(&a.probability));
-        let num_sure =
-            estimates.iter().filter(|(_, found)| found.state == LocalizationState::Converged).count();
-        let is_open = estimates.iter().any(|(_, found)| found.state == LocalizationState::Ambiguous);
-        let state = match (num_sure, is_open) {
-            (1, false) => LocalizationState::Converged,
-            (0, false) => LocalizationState::Lost,
-            // Sure in one part of the map counts only while no other part explains the scans nearly as well.
-            (1, true) if hypotheses.first().is_some_and(|best| best.probability > 0.99) => {
-                LocalizationState::Converged
-            }
-            _ => LocalizationState::Ambiguous,
-        };
-        let travel_m = estimates.first().map_or(0.0, |(_, estimate)| estimate.travel_m);
-        (state, travel_m, hypotheses)
-    }
-}
-
-/// What a session asks about, and whom.
-#[derive(Clone)]
-struct Memory {
-    config: Arc<EngineConfig>,
-    geometry: ScanGeometry,
-    index: Arc<PlaceIndex>,
-    recent: RecentScans,
-    /// Metres driven when it last asked.
-    recalled_at_m: f64,
-}
-
-impl Memory {
-    /// Where the last metres may have been driven.
-    fn places(&mut self) -> Vec<FoundPlace> {
-        let (config, geometry) = (&self.config, &self.geometry);
-        let read = Example::read(&config.translator, geometry, self.recent.scans(), &config.recall);
-        // The session's geometry passed the translator's check when it was opened; nothing to look for is no answer.
-        let example = read.ok().flatten();
-        example.map(|example| self.index.find(&example, &config.recall)).unwrap_or_default()
     }
 }
 
 impl App {
-    /// Opens a session in the serving map.
+    /// Opens a session in the serving map; a rough pose may be declared.
     ///
     /// # Errors
     /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
@@ -197,10 +82,11 @@ impl App {
         &self,
         site: &Site,
         geometry: ScanGeometry,
+        prior: Option<PosePrior>,
     ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
-        let search = self.new_search(site, &map, &geometry).await?;
+        let search = self.new_search(site, &map, &geometry, prior).await?;
         let session = Session {
             site: site.name().to_string(),
             geometry,
@@ -222,15 +108,8 @@ impl App {
         let estimating = search.clone();
         let next_sequence = search.next_sequence;
         drop(search);
-        let (state, travel_m, hypotheses) = on_blocking_thread(move || estimating.estimate()).await?;
-        Ok(LocalizationInfo {
-            id,
-            map_version: session.map_version,
-            state,
-            next_sequence,
-            travel_m,
-            hypotheses,
-        })
+        let estimate = on_blocking_thread(move || estimating.session.estimate()).await?;
+        Ok(LocalizationInfo { id, map_version: session.map_version, next_sequence, estimate })
     }
 
     /// Feeds a session. Scans it has seen are passed over; a gap is refused.
@@ -281,31 +160,34 @@ impl App {
         Ok(Arc::clone(session))
     }
 
-    async fn new_search(&self, site: &Site, map: &Map, geometry: &ScanGeometry) -> Result<Search, AppError> {
+    async fn new_search(
+        &self,
+        site: &Site,
+        map: &Map,
+        geometry: &ScanGeometry,
+        prior: Option<PosePrior>,
+    ) -> Result<Search, AppError> {
         let mut sizes: BTreeMap<u32, u64> = BTreeMap::new();
         for run in map.record.runs.iter().filter(|run| run.num_poses > 0) {
             *sizes.entry(run.component).or_default() += run.num_poses;
         }
-        let mut components: Vec<u32> = sizes.keys().copied().collect();
-        components.sort_by_key(|component| std::cmp::Reverse(sizes[component]));
-        let config = Arc::clone(&site.state().config);
-        let mut parts = Vec::new();
-        for component in components.into_iter().take(NUM_COMPONENTS_MAX) {
-            let served = self.served_map(site, map, component).await?;
-            parts.push((
-                component,
-                served,
-                Localizer::new(geometry.clone(), config.localization.localizer.clone()),
-            ));
+        let mut largest: Vec<u32> = sizes.keys().copied().collect();
+        largest.sort_by_key(|component| std::cmp::Reverse(sizes[component]));
+        let declared = prior.as_ref().map(PosePrior::component);
+        if let Some(component) = declared.filter(|component| !sizes.contains_key(component)) {
+            let problem = format!("the map has no component {component}");
+            return Err(AppError::invalid("prior.component", problem));
         }
-        let memory = Memory {
-            recent: RecentScans::new(config.recall.length_max_m),
-            geometry: geometry.clone(),
-            index: self.place_index(site, map).await?,
-            config,
-            recalled_at_m: 0.0,
-        };
-        Ok(Search { parts, memory, next_sequence: 0, latest_odom: None })
+        // A component that is named is looked at, however small it is.
+        largest.sort_by_key(|component| declared != Some(*component));
+        let mut components = Vec::new();
+        for component in largest.into_iter().take(NUM_COMPONENTS_MAX) {
+            components.push((component, self.served_map(site, map, component).await?));
+        }
+        let config = Arc::new(site.state().config.session());
+        let session_map = SessionMap { components, index: self.place_index(site, map).await? };
+        let session = SiteSession::new(geometry.clone(), config, session_map, prior);
+        Ok(Search { session, next_sequence: 0, latest_odom: None })
     }
 
     /// A component with the fields that localisation looks things up in.
@@ -318,7 +200,7 @@ impl App {
         let grid = self.grid(site, map, component).await?;
         let config = Arc::clone(&site.state().config);
         let served = on_blocking_thread(move || {
-            ServedMap::build(halved(&grid), &config.localization.likelihood_field)
+            ServedMap::build(grid.halved(), &config.localization.likelihood_field)
         })
         .await?;
         let served = Arc::new(served);
@@ -351,21 +233,4 @@ impl Session {
     fn idle_for(&self) -> Duration {
         self.latest_use.lock().unwrap_or_else(PoisonError::into_inner).elapsed()
     }
-}
-
-/// The grid with cells of twice the edge, which is fine enough to localise in: a wall stays a wall.
-fn halved(grid: &GridMap) -> GridMap {
-    let (width, height) = (grid.width().div_ceil(2), grid.height().div_ceil(2));
-    let mut halved = GridMap::unknown(width, height, 2.0 * grid.resolution_m(), grid.origin());
-    for row in 0..grid.height() as i64 {
-        for column in 0..grid.width() as i64 {
-            let state = grid.state(column, row);
-            let known = halved.state(column / 2, row / 2);
-            let is_news = state == CellState::Occupied || known == CellState::Unknown;
-            if is_news && state != CellState::Unknown {
-                halved.set(column / 2, row / 2, state);
-            }
-        }
-    }
-    halved
 }

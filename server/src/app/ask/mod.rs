@@ -4,6 +4,6 @@ mod examples;
 mod localizations;
 mod words;
 
-pub use examples::{ExampleInfo, ExamplePlace, PlaceIndexes};
-pub use localizations::{LocalizationInfo, Localizations, LocatedHypothesis};
+pub use examples::{ExampleInfo, PlaceIndexes};
+pub use localizations::{LocalizationInfo, Localizations};
 pub use words::{WordAnswer, find_words};

@@ -59,7 +59,8 @@ impl MatchFilter {
         Self { state: Some(MatchStateKind::Verified), ..Self::default() }
     }
 
-    fn accepts(&self, found: &PlaceMatch) -> bool {
+    /// Whether a match is one of them.
+    pub fn accepts(&self, found: &PlaceMatch) -> bool {
         self.state.is_none_or(|state| state == MatchStateKind::from(&found.state))
             && self.channel.is_none_or(|channel| channel == found.channel)
             && self.direction.is_none_or(|direction| direction == found.direction)

@@ -4,14 +4,16 @@ use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
 use axum::{Extension, Json};
-use locution_engine::locate::LocalizationState;
+use locution_engine::geometry::Pose2;
+use locution_engine::locate::{Hypothesis, LocalizationState, Missing, PosePrior};
+use locution_engine::recall::AnsweredPlace;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::batches::{BatchDto, ScanDto};
 use super::runs::GeometryDto;
 use crate::app::AppError;
-use crate::app::ask::{ExampleInfo, ExamplePlace, LocalizationInfo};
+use crate::app::ask::{ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::error::ApiError;
@@ -20,7 +22,7 @@ use crate::http::values::{ChannelDto, DirectionDto, PoseDto};
 use crate::http::with_location;
 use crate::state::AppState;
 
-/// Opens a localisation; the same body as that of a run.
+/// Opens a localisation; the body of a run, and what is known of where the robot is.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NewLocalizationDto {
@@ -28,6 +30,69 @@ pub struct NewLocalizationDto {
     pub robot: Option<String>,
     /// The laser.
     pub geometry: GeometryDto,
+    /// Where the robot is said to be when the session begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior: Option<PosePriorDto>,
+}
+
+/// A rough pose that a person or another system declares. It is weighed, not believed.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PosePriorDto {
+    /// The component of the map whose frame the pose is in.
+    #[serde(default)]
+    pub component: u32,
+    /// Where.
+    pub map_from_robot: PoseDto,
+    /// Covariance of (x, y, θ), row by row.
+    pub covariance: [[f64; 3]; 3],
+}
+
+impl PosePriorDto {
+    /// The declaration as the engine weighs it.
+    ///
+    /// # Errors
+    /// 422 for a matrix that is no covariance.
+    pub fn check(&self) -> Result<PosePrior, ApiError> {
+        let PoseDto { x, y, theta } = self.map_from_robot;
+        PosePrior::new(self.component, Pose2::new(x, y, theta), self.covariance).ok_or_else(|| {
+            ApiError::invalid(
+                "prior.covariance",
+                "must be symmetric with positive variances, the pose finite",
+            )
+        })
+    }
+}
+
+/// What is missing before a robot counts as found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MissingDto {
+    /// Too little was driven.
+    Travel,
+    /// That the robot is not in this map is too probable.
+    Elsewhere,
+    /// Another place of the map is too probable.
+    Alternatives,
+    /// The best place has not been the best one for long enough.
+    Persistence,
+    /// What was seen last contradicts the best place.
+    RecentScans,
+    /// The pose could slide too far, as it can along a plain corridor.
+    Position,
+}
+
+impl From<Missing> for MissingDto {
+    fn from(missing: Missing) -> Self {
+        match missing {
+            Missing::Travel => Self::Travel,
+            Missing::Elsewhere => Self::Elsewhere,
+            Missing::Alternatives => Self::Alternatives,
+            Missing::Persistence => Self::Persistence,
+            Missing::RecentScans => Self::RecentScans,
+            Missing::Position => Self::Position,
+        }
+    }
 }
 
 /// How sure an answer is.
@@ -81,29 +146,42 @@ pub struct LocalizationDto {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<HypothesisDto>,
+    /// Probability that the robot is not in this map; with those of all places 1.
+    #[schema(minimum = 0, maximum = 1)]
+    pub probability_elsewhere: f64,
+    /// What is missing to be `converged`; empty when it is.
+    pub missing: Vec<MissingDto>,
+    /// Whether the likeliest place is the one that was declared; absent without a declaration or a likely place.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub prior_agrees: Option<bool>,
 }
 
 impl From<LocalizationInfo> for LocalizationDto {
     fn from(info: LocalizationInfo) -> Self {
+        let estimate = info.estimate;
         Self {
             id: info.id.to_string(),
             map_version: info.map_version,
-            state: info.state.into(),
+            state: estimate.state.into(),
             next_sequence: info.next_sequence,
-            travel_m: info.travel_m,
-            hypotheses: hypotheses_of(&info),
+            travel_m: estimate.travel_m,
+            hypotheses: estimate.hypotheses.into_iter().map(HypothesisDto::from).collect(),
+            probability_elsewhere: estimate.probability_elsewhere,
+            missing: estimate.missing.into_iter().map(MissingDto::from).collect(),
+            prior_agrees: estimate.prior_agrees,
         }
     }
 }
 
-fn hypotheses_of(info: &LocalizationInfo) -> Vec<HypothesisDto> {
-    let hypothesis = |found: &crate::app::ask::LocatedHypothesis| HypothesisDto {
-        component: found.component,
-        map_from_robot: found.map_from_robot.into(),
-        covariance: found.covariance,
-        probability: found.probability,
-    };
-    info.hypotheses.iter().map(hypothesis).collect()
+impl From<Hypothesis> for HypothesisDto {
+    fn from(found: Hypothesis) -> Self {
+        Self {
+            component: found.component,
+            map_from_robot: found.map_from_robot.into(),
+            covariance: found.covariance,
+            probability: found.probability,
+        }
+    }
 }
 
 /// A short recording that is asked about and not stored.
@@ -140,6 +218,9 @@ pub struct ExampleAnswerDto {
     pub travel_m: f64,
     /// Places where the robot was at the end of the example, likeliest first.
     pub places: Vec<ExamplePlaceDto>,
+    /// Probability that the example was not made in this site.
+    #[schema(minimum = 0, maximum = 1)]
+    pub probability_elsewhere: f64,
 }
 
 /// A place where an example may end.
@@ -186,19 +267,22 @@ pub struct ExampleEvidenceDto {
 
 impl From<ExampleInfo> for ExampleAnswerDto {
     fn from(info: ExampleInfo) -> Self {
+        let run = |place: &AnsweredPlace| info.runs.get(place.found.earlier.run_idx as usize).cloned();
+        let place = |place: AnsweredPlace| ExamplePlaceDto::new(run(&place).unwrap_or_default(), place);
         Self {
             site: info.site,
             map_version: info.map_version,
-            state: info.state.into(),
+            state: info.answer.state.into(),
             travel_m: info.travel_m,
-            places: info.places.into_iter().map(ExamplePlaceDto::from).collect(),
+            places: info.answer.places.into_iter().map(place).collect(),
+            probability_elsewhere: info.answer.probability_elsewhere,
         }
     }
 }
 
-impl From<ExamplePlace> for ExamplePlaceDto {
-    fn from(place: ExamplePlace) -> Self {
-        let ExamplePlace { found, run, probability } = place;
+impl ExamplePlaceDto {
+    fn new(run: String, place: AnsweredPlace) -> Self {
+        let AnsweredPlace { found, probability } = place;
         Self {
             component: found.component,
             map_from_robot: found.map_from_robot.into(),
@@ -232,7 +316,8 @@ pub async fn open_localization(
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
     let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
-    let info = state.app.open_localization(&site, geometry).await?;
+    let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
+    let info = state.app.open_localization(&site, geometry, prior).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }

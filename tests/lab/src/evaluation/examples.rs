@@ -67,6 +67,8 @@ pub struct ExampleReport {
     pub elsewhere: usize,
     /// Of the former: the first place is right, however sure.
     pub first_right: f64,
+    /// Of the former: one of the first five places is right.
+    pub among_first_five: f64,
     /// Of the former: sure and right.
     pub found: f64,
     /// Of the former: sure and wrong.
@@ -77,6 +79,8 @@ pub struct ExampleReport {
     pub not_here: f64,
     /// Places by the probability that they were given.
     pub reliability: Vec<ReliabilityBin>,
+    /// Mean distance of what was said from what was right over the bins, by their places (expected calibration error).
+    pub calibration_error: f64,
     /// Mean squared error of the first place's probability (Brier score).
     pub brier: f64,
     /// Time to the answer.
@@ -95,16 +99,21 @@ pub fn judge_examples(trials: &[ExampleTrial]) -> ExampleReport {
         let said = trial.answered.first().map_or(0.0, |place| place.1);
         (said - f64::from(u8::from(trial.is_first_right()))).powi(2)
     };
+    let is_among_five =
+        |trial: &ExampleTrial| trial.answered.iter().take(5).any(|place| trial.is_right(&place.0));
+    let reliability = reliability(trials);
     let latencies_ms: Vec<f64> = trials.iter().map(|trial| 1e3 * trial.latency_s).collect();
     ExampleReport {
         here: here.len(),
         elsewhere: elsewhere.len(),
         first_right: of(&here, &ExampleTrial::is_first_right),
+        among_first_five: of(&here, &is_among_five),
         found: of(&here, &|trial| trial.is_sure && trial.is_first_right()),
         wrongly_sure: of(&here, &|trial| trial.is_sure && !trial.is_first_right()),
         sure_elsewhere: of(&elsewhere, &|trial| trial.is_sure),
         not_here: of(&elsewhere, &|trial| here_at_all(trial) <= 0.5),
-        reliability: reliability(trials),
+        calibration_error: calibration_error(&reliability),
+        reliability,
         brier: trials.iter().map(squared_error).sum::<f64>() / trials.len().max(1) as f64,
         latency_ms: LatencyMs { median: quantile(&latencies_ms, 0.5), p99: quantile(&latencies_ms, 0.99) },
     }
@@ -124,6 +133,12 @@ fn reliability(trials: &[ExampleTrial]) -> Vec<ReliabilityBin> {
         right: share(right, places),
     };
     bins.into_iter().filter(|bin| bin.0 > 0).map(as_shares).collect()
+}
+
+fn calibration_error(bins: &[ReliabilityBin]) -> f64 {
+    let num_places: usize = bins.iter().map(|bin| bin.places).sum();
+    let off: f64 = bins.iter().map(|bin| bin.places as f64 * (bin.said - bin.right).abs()).sum();
+    off / num_places.max(1) as f64
 }
 
 #[cfg(test)]
@@ -148,6 +163,9 @@ mod tests {
         let third = 1.0 / 3.0;
         assert_eq!((report.here, report.elsewhere), (3, 2));
         assert_eq!((report.first_right, report.found, report.wrongly_sure), (third, third, third));
+        assert_eq!(report.among_first_five, 2.0 * third);
+        let off = (0.03f64 - 1.0).abs() + 3.0 * ((0.98 + 0.96 + 0.97) / 3.0 - third);
+        assert!((report.calibration_error - off / 4.0).abs() < 1e-9, "{report:?}");
         assert_eq!((report.sure_elsewhere, report.not_here), (0.5, 0.5));
         assert_eq!(report.reliability.len(), 2);
         assert_eq!((report.reliability[1].places, report.reliability[1].right), (3, third));

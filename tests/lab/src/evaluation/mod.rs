@@ -11,6 +11,7 @@ mod examples;
 mod labels;
 mod localization;
 mod map_error;
+mod open_world;
 mod recognition;
 mod revisits;
 mod spoiled_graphs;
@@ -24,6 +25,7 @@ pub use localization::{
     LocalizationReport, LocalizationTrial, MetersToConverge, TrialOutcome, judge_localization,
 };
 pub use map_error::{EstimatedPose, MapErrorReport, judge_map};
+pub use open_world::{OpenWorldReport, OpenWorldStep, OpenWorldTrial, judge_open_world};
 pub use recognition::{
     CurvePoint, JudgedMatch, RecallAtPrecision, RecognitionReport, RevisitCounts, VerifiedReport,
     judge_recognition,

@@ -127,6 +127,7 @@ fn summarize(particles: &Particles, members: &[u32], origin: &Point2, total: f64
         }
     }
     Hypothesis {
+        component: 0,
         map_from_robot: Pose2::new(mean.x + origin.x, mean.y + origin.y, mean.theta),
         covariance,
         probability: mass / total,

@@ -1,0 +1,10 @@
+from enum import Enum
+
+
+class Channel(str, Enum):
+    PROFILE = "profile"
+    SPATIAL = "spatial"
+    WORDS = "words"
+
+    def __str__(self) -> str:
+        return str(self.value)

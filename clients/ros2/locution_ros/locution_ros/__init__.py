@@ -1,0 +1,1 @@
+"""A robot with ROS 2 as a client of a Locution server."""
