@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::path::PathBuf;
 
 use locution_server::config::ServerConfig;
-use locution_server::{RunningServer, start_server};
+use locution_server::{RunningServer, StartError, start_server};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use reqwest::{Method, StatusCode};
@@ -56,6 +56,13 @@ impl TestServer {
         let server = start_server(self.config.clone()).await.unwrap();
         let api = Api { base: server.url(), ..self.api };
         Self { server, directory: self.directory, config: self.config, api }
+    }
+
+    /// Reads keys and certificates again after `adjust` had its say, as SIGHUP does.
+    pub fn reload(&self, adjust: impl FnOnce(&mut ServerConfig)) -> Result<(), StartError> {
+        let mut config = self.config.clone();
+        adjust(&mut config);
+        self.server.reload(&config)
     }
 
     /// Stops it in order.

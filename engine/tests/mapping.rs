@@ -2,10 +2,15 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::{Point2, Pose2, wrap_angle};
 use locution_engine::mapping::{
-    Decision, Keyframe, MatchState, RegistrationMemo, RejectionReason, RunRecord, SiteMap, map_site,
+    Decision, Keyframe, MapStage, MapStep, MappingError, MatchState, RegistrationMemo, RejectionReason,
+    RunRecord, SiteMap, Watch, map_site, map_site_watched,
 };
 use locution_engine::scan::ScanGeometry;
 use locution_engine::text::{Observation, Word};
@@ -208,4 +213,40 @@ fn what_the_memo_holds_does_not_change_the_map() {
     let last = first.keyframes.last().unwrap();
     let trajectory = remembered.runs[0].trajectory(&first.keyframes);
     assert!(trajectory.at(last.scan_seq, &last.run_from_robot).is_some());
+}
+
+/// Ends the making of a map after some steps, several times with one memory; then lets it be made.
+#[test]
+fn a_map_that_was_ended_half_way_is_made_in_the_end_as_if_nothing_had_been() {
+    let world = ring_world();
+    let runs = [
+        Driven::new(&world, &[(4.0, 2.0), (28.0, 2.0), (28.0, 18.0), (2.0, 18.0), (2.0, 3.0)], 3),
+        Driven::new(&world, &[(28.0, 10.0), (28.0, 18.0), (2.0, 18.0), (2.0, 2.0), (20.0, 2.0)], 4),
+    ];
+    let records: Vec<RunRecord<'_>> = runs.iter().map(Driven::record).collect();
+    let config = EngineConfig::default().mapping;
+    let steps = Mutex::new(Vec::new());
+    let told = |step: MapStep| {
+        steps.lock().unwrap().push(step);
+        ControlFlow::Continue(())
+    };
+    let watch = Watch::new(&told);
+    let expected = map_site_watched(&config, &records, &[], &mut RegistrationMemo::default(), watch).unwrap();
+    let steps = steps.into_inner().unwrap();
+    assert!(steps.iter().all(|step| (0.0..=1.0).contains(&step.share)));
+    assert!(MapStage::ALL.iter().all(|stage| steps.iter().any(|step| step.stage == *stage)));
+
+    let mut memo = RegistrationMemo::default();
+    for end in [0, steps.len() / 4, steps.len() / 2] {
+        let num_steps = AtomicUsize::new(0);
+        let stopping = |_| match num_steps.fetch_add(1, Ordering::Relaxed) >= end {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        };
+        let ended = map_site_watched(&config, &records, &[], &mut memo, Watch::new(&stopping));
+        assert_eq!(ended, Err(MappingError::Stopped));
+        assert!(end == 0 || !memo.is_empty(), "what was registered is remembered");
+        memo = postcard::from_bytes(&postcard::to_allocvec(&memo).unwrap()).unwrap();
+    }
+    assert_eq!(map_site(&config, &records, &[], &mut memo).unwrap(), expected);
 }

@@ -24,6 +24,11 @@ pub struct ServerConfig {
     pub builds: BuildsConfig,
     /// What goes to the log.
     pub log: LogConfig,
+    /// TLS; without it connections are plain.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tls: Option<TlsConfig>,
+    /// Browsers: other names of this server and pages from elsewhere.
+    pub web: WebConfig,
     /// Who may do what. Without keys everything is allowed, but only from this machine.
     pub keys: Vec<ApiKeyConfig>,
 }
@@ -37,6 +42,8 @@ impl Default for ServerConfig {
             storage: StorageConfig::default(),
             builds: BuildsConfig::default(),
             log: LogConfig::default(),
+            tls: None,
+            web: WebConfig::default(),
             keys: Vec::new(),
         }
     }
@@ -46,8 +53,26 @@ impl Default for ServerConfig {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LimitsConfig {
-    /// Largest request body, after decompression, bytes.
+    /// Largest request body with scans, after decompression, bytes.
     pub body_bytes_max: usize,
+    /// Largest other request body, such as the configuration of a site, after decompression, bytes.
+    pub small_body_bytes_max: usize,
+    /// Memory for all bodies that are being received or waiting, bytes; more are refused with 503.
+    pub received_bytes_max: usize,
+    /// Memory for all bodies that are being read as JSON or CBOR, by their size at worst, bytes; more wait, then 503.
+    pub parsed_bytes_max: usize,
+    /// Share of places and memory that one key may hold; the rest is for the others. Without keys there are no shares.
+    pub share_per_key_max: f64,
+    /// Most connections; one more makes the one that gives least make way.
+    pub num_connections_max: usize,
+    /// Longest a connection may take to send the head of its next request, and so be idle, seconds.
+    pub head_time_max_s: f64,
+    /// Longest a body may come without a byte, or an answer not be taken, seconds.
+    pub stall_max_s: f64,
+    /// Longest a body may take to come, seconds.
+    pub body_time_max_s: f64,
+    /// How long requests under way may go on when the server stops, seconds.
+    pub shutdown_s: f64,
     /// Most scans in one batch.
     pub num_scans_per_batch_max: usize,
     /// Most readings in one scan.
@@ -58,7 +83,8 @@ pub struct LimitsConfig {
     pub odometry_step_max_m: f64,
     /// Most requests being served at once; more are refused with 503.
     pub num_requests_max: usize,
-    /// Most batches read, waiting or being translated at once; more are refused with 429.
+    /// Most batches and examples waiting or being worked on at once; more are refused with 429. A place is taken when
+    /// the body is there.
     pub num_batches_max: usize,
     /// Most batches of one run at once; more are refused with 429.
     pub num_batches_per_run_max: usize,
@@ -67,6 +93,10 @@ pub struct LimitsConfig {
     /// Most localisations at once.
     #[serde(alias = "num_localisations_max")]
     pub num_localizations_max: usize,
+    /// Memory for the indexes of the texts of all sites, bytes; those asked for least lately make way and are read again.
+    pub text_index_bytes_max: usize,
+    /// Most streams of events at once; more are refused with 429.
+    pub num_event_streams_max: usize,
     /// Longest a request may take, seconds.
     pub request_timeout_s: u64,
 }
@@ -75,6 +105,15 @@ impl Default for LimitsConfig {
     fn default() -> Self {
         Self {
             body_bytes_max: 16 << 20,
+            small_body_bytes_max: 128 << 10,
+            received_bytes_max: 128 << 20,
+            parsed_bytes_max: 256 << 20,
+            share_per_key_max: 0.5,
+            num_connections_max: 512,
+            head_time_max_s: 30.0,
+            stall_max_s: 10.0,
+            body_time_max_s: 120.0,
+            shutdown_s: 5.0,
             num_scans_per_batch_max: 5_000,
             num_ranges_per_scan_max: 8_192,
             num_runs_per_site_max: 10_000,
@@ -84,6 +123,8 @@ impl Default for LimitsConfig {
             num_batches_per_run_max: 4,
             num_open_runs_max: 256,
             num_localizations_max: 32,
+            text_index_bytes_max: 256 << 20,
+            num_event_streams_max: 64,
             request_timeout_s: 600,
         }
     }
@@ -115,13 +156,16 @@ pub struct BuildsConfig {
     pub settle_s: f64,
     /// Most builds at once, over all sites.
     pub num_builds_max: usize,
+    /// How long a build may go on while builds of other sites wait, seconds; then it lets them pass and goes on when its
+    /// turn comes again, for twice as long.
+    pub turn_s: f64,
     /// Map versions kept per site, the serving one included.
     pub num_versions_kept: usize,
 }
 
 impl Default for BuildsConfig {
     fn default() -> Self {
-        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 1, num_versions_kept: 5 }
+        Self { is_automatic: true, settle_s: 2.0, num_builds_max: 2, turn_s: 5.0, num_versions_kept: 5 }
     }
 }
 
@@ -142,10 +186,11 @@ impl Default for LogConfig {
 }
 
 /// What a key may do; each scope includes those before it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Scope {
     /// Look, query, localise.
+    #[default]
     Read,
     /// Also send runs, build maps and decide on matches.
     Write,
@@ -153,8 +198,19 @@ pub enum Scope {
     Admin,
 }
 
+impl Scope {
+    /// As the configuration and the document spell it.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Write => "write",
+            Self::Admin => "admin",
+        }
+    }
+}
+
 /// An API key, known by its hash only.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ApiKeyConfig {
     /// For the log.
@@ -165,6 +221,36 @@ pub struct ApiKeyConfig {
     pub scope: Scope,
     /// Sites it may do it in; `*` means all.
     pub sites: Vec<String>,
+    /// When it stops being valid, seconds since 1970; never unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub expires_at_s: Option<u64>,
+    /// Most requests in a second, on average; no limit of its own unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub requests_per_s_max: Option<f64>,
+    /// Most localisations at once; no limit of its own unless said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub num_localizations_max: Option<usize>,
+}
+
+/// Where the certificate of TLS and its key are, as PEM; both are read again on SIGHUP.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TlsConfig {
+    /// The certificate, and behind it those that vouch for it.
+    pub certificate: PathBuf,
+    /// The private key.
+    pub key: PathBuf,
+}
+
+/// What browsers may do. A server without keys answers only requests that name this machine as `Host` and come from no
+/// other `Origin`; both lists let in more.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct WebConfig {
+    /// Further names or addresses, without port, by which a server without keys may be called.
+    pub hosts: Vec<String>,
+    /// Origins such as `https://fleet.example` whose pages may use the API (CORS).
+    pub origins: Vec<String>,
 }
 
 /// A configuration that the server cannot start with.
@@ -212,12 +298,13 @@ impl ServerConfig {
         let invalid = |field: &str, problem: &str| {
             Err(ServerConfigError::Invalid { field: field.into(), problem: problem.into() })
         };
-        if !self.address.ip().is_loopback() && self.keys.is_empty() {
-            return invalid("address", "listening beyond this machine needs at least one entry in `keys`");
-        }
         let limits = &self.limits;
         let positive = [
             ("limits.body_bytes_max", limits.body_bytes_max),
+            ("limits.small_body_bytes_max", limits.small_body_bytes_max),
+            ("limits.received_bytes_max", limits.received_bytes_max),
+            ("limits.parsed_bytes_max", limits.parsed_bytes_max),
+            ("limits.num_connections_max", limits.num_connections_max),
             ("limits.num_scans_per_batch_max", limits.num_scans_per_batch_max),
             ("limits.num_ranges_per_scan_max", limits.num_ranges_per_scan_max),
             ("limits.num_requests_max", limits.num_requests_max),
@@ -232,6 +319,20 @@ impl ServerConfig {
                 return invalid(field, "must be at least 1");
             }
         }
+        let durations = [
+            ("limits.head_time_max_s", limits.head_time_max_s),
+            ("limits.stall_max_s", limits.stall_max_s),
+            ("limits.body_time_max_s", limits.body_time_max_s),
+            ("limits.shutdown_s", limits.shutdown_s),
+        ];
+        for (field, value) in durations {
+            if !(value > 0.0 && value <= 86_400.0) {
+                return invalid(field, "must lie above 0 and at most at 86400 seconds");
+            }
+        }
+        if !(limits.share_per_key_max > 0.0 && limits.share_per_key_max <= 1.0) {
+            return invalid("limits.share_per_key_max", "must lie above 0 and at most at 1");
+        }
         if limits.num_ranges_per_scan_max > 65_536 {
             return invalid("limits.num_ranges_per_scan_max", "must be at most 65536");
         }
@@ -244,9 +345,29 @@ impl ServerConfig {
         if !(self.builds.settle_s >= 0.0 && self.builds.settle_s <= 86_400.0) {
             return invalid("builds.settle_s", "must lie between 0 and 86400 seconds");
         }
+        if !(self.builds.turn_s > 0.0 && self.builds.turn_s <= 86_400.0) {
+            return invalid("builds.turn_s", "must lie above 0 and at most at 86400 seconds");
+        }
+        for (idx, origin) in self.web.origins.iter().enumerate() {
+            let is_origin = origin.split_once("://").is_some_and(|(scheme, host)| {
+                ["http", "https"].contains(&scheme) && !host.is_empty() && !host.contains(['/', '*', ' '])
+            });
+            if !is_origin {
+                return invalid(
+                    &format!("web.origins[{idx}]"),
+                    "must be like `https://host:port`, nothing behind",
+                );
+            }
+        }
         for (idx, key) in self.keys.iter().enumerate() {
             if key.sha256.len() != 64 || !key.sha256.bytes().all(|byte| byte.is_ascii_hexdigit()) {
                 return invalid(&format!("keys[{idx}].sha256"), "must be 64 hexadecimal digits");
+            }
+            if key.requests_per_s_max.is_some_and(|rate| !(rate > 0.0 && rate <= 1e6)) {
+                return invalid(
+                    &format!("keys[{idx}].requests_per_s_max"),
+                    "must lie above 0 and at most at 1e6",
+                );
             }
         }
         Ok(())
@@ -255,7 +376,8 @@ impl ServerConfig {
 
 /// Variables that begin with the name of a field. Others of the prefix belong to other tools, such as the tests.
 fn environment() -> Env {
-    const FIELDS: [&str; 7] = ["address", "data_directory", "limits", "storage", "builds", "log", "keys"];
+    const FIELDS: [&str; 9] =
+        ["address", "data_directory", "limits", "storage", "builds", "log", "tls", "web", "keys"];
     let is_ours = |key: &figment::value::UncasedStr| {
         let key = key.as_str().to_ascii_lowercase();
         FIELDS.iter().any(|field| key == *field || key.starts_with(&format!("{field}__")))
@@ -273,19 +395,6 @@ mod tests {
         config.validate().unwrap();
         let printed = toml::to_string(&config).unwrap();
         assert_eq!(toml::from_str::<ServerConfig>(&printed).unwrap(), config);
-    }
-
-    #[test]
-    fn other_machines_are_refused_without_a_key() {
-        let mut config = ServerConfig { address: "0.0.0.0:7070".parse().unwrap(), ..Default::default() };
-        assert!(config.validate().unwrap_err().to_string().starts_with("address"));
-        config.keys.push(ApiKeyConfig {
-            name: "fleet".into(),
-            sha256: "0".repeat(64),
-            scope: Scope::Write,
-            sites: vec!["*".into()],
-        });
-        config.validate().unwrap();
     }
 
     #[test]

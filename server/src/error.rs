@@ -36,6 +36,26 @@ pub struct Problem {
     pub expected_sequence: Option<u64>,
 }
 
+/// Longest explanation, bytes: what a client sent is echoed only as far as it helps to find the fault.
+const DETAIL_BYTES_MAX: usize = 300;
+/// Longest path of a value, bytes.
+const FIELD_BYTES_MAX: usize = 200;
+
+/// The beginning of a text that is too long.
+pub(crate) fn shortened(mut text: String, num_bytes_max: usize) -> String {
+    if text.len() > num_bytes_max {
+        let end = (0..=num_bytes_max).rev().find(|end| text.is_char_boundary(*end)).unwrap_or(0);
+        text.truncate(end);
+        text.push('…');
+        text.shrink_to_fit();
+    }
+    text
+}
+
+/// The last part of a problem's type; an extension of its answer, for the log and the metrics.
+#[derive(Clone, Debug)]
+pub(crate) struct Slug(pub(crate) String);
+
 /// A refusal or failure on its way to the client.
 #[derive(Clone, Debug)]
 pub struct ApiError {
@@ -50,7 +70,7 @@ impl ApiError {
             kind: format!("{TYPE_PREFIX}{slug}"),
             title: title.to_owned(),
             status: status.as_u16(),
-            detail: detail.into(),
+            detail: shortened(detail.into(), DETAIL_BYTES_MAX),
             field: None,
             expected_sequence: None,
         };
@@ -59,7 +79,7 @@ impl ApiError {
 
     /// Says which value of the request is meant.
     pub fn at(mut self, field: impl Into<String>) -> Self {
-        self.problem.field = Some(field.into());
+        self.problem.field = Some(shortened(field.into(), FIELD_BYTES_MAX));
         self
     }
 
@@ -92,6 +112,18 @@ impl ApiError {
     /// 404: no such thing.
     pub fn not_found(detail: impl Into<String>) -> Self {
         Self::new(StatusCode::NOT_FOUND, "not-found", "Not found", detail)
+    }
+
+    /// 401: nobody known asks.
+    pub fn unauthorized(detail: &str) -> Self {
+        Self::new(StatusCode::UNAUTHORIZED, "unauthorized", "A key is needed", detail)
+    }
+
+    /// 429: a key asks more often than it may.
+    pub fn too_often(seconds: u64) -> Self {
+        let detail = "the key has sent more requests than it may in a second";
+        Self::new(StatusCode::TOO_MANY_REQUESTS, "too-often", "Too many requests", detail)
+            .retry_after(seconds)
     }
 
     /// 503: too much at once.
@@ -129,6 +161,10 @@ impl From<AppError> for ApiError {
             AppError::Busy { retry_after, .. } => {
                 Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
                     .retry_after(retry_after.as_secs().max(1))
+            }
+            AppError::Stopping => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "stopping", "The server stops", detail)
+                    .retry_after(5)
             }
             AppError::Storage(error) => Self::from(error),
             AppError::Internal { what } => {
@@ -170,12 +206,30 @@ impl From<StorageError> for ApiError {
 impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let status = StatusCode::from_u16(self.problem.status).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+        let slug = self.problem.kind.trim_start_matches(TYPE_PREFIX).to_owned();
         let mut response = (status, Json(self.problem)).into_response();
+        response.extensions_mut().insert(Slug(slug));
         let headers = response.headers_mut();
         headers.insert(header::CONTENT_TYPE, HeaderValue::from_static("application/problem+json"));
+        if status == StatusCode::UNAUTHORIZED {
+            headers.insert(header::WWW_AUTHENTICATE, HeaderValue::from_static("Bearer"));
+        }
         if let Some(seconds) = self.retry_after_s {
             headers.insert(header::RETRY_AFTER, HeaderValue::from(seconds));
         }
         response
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn echoes_are_bounded_at_a_character() {
+        let error = ApiError::malformed("ä".repeat(10_000_000)).at("ß".repeat(10_000));
+        assert!(error.problem.detail.len() <= DETAIL_BYTES_MAX + 3 && error.problem.detail.ends_with("ä…"));
+        assert!(error.problem.field.unwrap().len() <= FIELD_BYTES_MAX + 3);
+        assert_eq!(ApiError::malformed("short").problem.detail, "short");
     }
 }

@@ -4,13 +4,11 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use axum::body::Bytes;
-use axum::extract::rejection::BytesRejection;
 use axum::extract::{FromRequest, FromRequestParts, Path, Query, Request};
 use axum::http::request::Parts;
 use axum::http::{HeaderMap, StatusCode, Uri, header};
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use tokio::sync::OwnedSemaphorePermit;
 
 use crate::app::site::Site;
 use crate::app::{AppError, Name};
@@ -30,7 +28,9 @@ impl<T: DeserializeOwned + Send + 'static> FromRequest<AppState> for Body<T> {
 
     async fn from_request(request: Request, state: &AppState) -> Result<Self, ApiError> {
         let format = Format::of(request.headers())?;
-        let bytes = Bytes::from_request(request, state).await.map_err(unreadable)?;
+        let bytes = Bytes::from_request(request, state)
+            .await
+            .map_err(|rejection| ApiError::malformed(rejection.body_text()))?;
         if bytes.len() <= NUM_BYTES_PARSED_INLINE {
             return format.parse(&bytes).map(Self);
         }
@@ -49,7 +49,7 @@ impl Format {
     fn of(headers: &HeaderMap) -> Result<Self, ApiError> {
         let content_type =
             headers.get(header::CONTENT_TYPE).and_then(|value| value.to_str().ok()).unwrap_or("");
-        match content_type.split(';').next().unwrap_or("").trim() {
+        match content_type.split(';').next().unwrap_or("").trim().to_ascii_lowercase().as_str() {
             "" | "application/json" => Ok(Self::Json),
             "application/cbor" => Ok(Self::Cbor),
             other => {
@@ -82,7 +82,14 @@ fn parse_json<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
 }
 
 fn parse_cbor<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, ApiError> {
-    if let Ok(value) = ciborium::from_reader(bytes) {
+    let mut rest = bytes;
+    if let Ok(value) = ciborium::from_reader(&mut rest) {
+        if !rest.is_empty() {
+            let position = bytes.len() - rest.len();
+            return Err(ApiError::malformed(format!(
+                "trailing bytes behind the document, from byte {position}"
+            )));
+        }
         return Ok(value);
     }
     match ciborium::from_reader::<Located<T>, _>(bytes) {
@@ -122,25 +129,6 @@ fn malformed(path: String, error: &dyn std::fmt::Display) -> ApiError {
         return ApiError::malformed(problem);
     }
     ApiError::malformed(format!("{path}: {problem}")).at(path)
-}
-
-fn unreadable(rejection: BytesRejection) -> ApiError {
-    if rejection.status() == StatusCode::PAYLOAD_TOO_LARGE {
-        let detail = "the body is larger than the server's limits.body_bytes_max";
-        return ApiError::new(StatusCode::PAYLOAD_TOO_LARGE, "too-large", "Body too large", detail);
-    }
-    ApiError::malformed(rejection.body_text())
-}
-
-/// A place in the bounded queue of batches, taken before the body is read.
-pub struct BatchSlot(pub OwnedSemaphorePermit);
-
-impl FromRequestParts<AppState> for BatchSlot {
-    type Rejection = ApiError;
-
-    async fn from_request_parts(_: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
-        Ok(Self(state.app.batch_slot()?))
-    }
 }
 
 /// The site named in the path.

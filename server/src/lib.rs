@@ -8,14 +8,12 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 use std::net::SocketAddr;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
-use axum::serve::ListenerExt;
-use metrics_exporter_prometheus::{Matcher, PrometheusBuilder, PrometheusHandle};
 use thiserror::Error;
 use tokio::net::TcpListener;
-use tokio::sync::watch;
 use tokio::task::JoinHandle;
+use tokio_util::sync::CancellationToken;
 
 mod app;
 mod auth;
@@ -23,17 +21,25 @@ pub mod config;
 mod error;
 mod extract;
 mod http;
+mod intake;
+mod listener;
+mod observe;
 mod picture;
 mod records;
 mod router;
 mod state;
 mod storage;
+mod telemetry;
 pub mod upkeep;
 
 pub use http::openapi::document_json;
+pub use telemetry::names as metric_names;
 
 use app::App;
+use auth::Gate;
 use config::{ServerConfig, ServerConfigError};
+use intake::Places;
+use listener::Certificate;
 use state::AppState;
 use storage::{SledConfig, SledStorage, StorageError};
 
@@ -54,6 +60,9 @@ pub enum StartError {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The certificate or its key cannot be used.
+    #[error("tls: {0}")]
+    Tls(String),
     /// The use cases could not take up their work.
     #[error(transparent)]
     App(#[from] app::AppError),
@@ -63,8 +72,10 @@ pub enum StartError {
 pub struct RunningServer {
     address: SocketAddr,
     app: Arc<App>,
-    stop: watch::Sender<bool>,
-    serving: JoinHandle<std::io::Result<()>>,
+    gate: Arc<Gate>,
+    certificate: Option<Arc<Certificate>>,
+    stop: CancellationToken,
+    serving: JoinHandle<()>,
 }
 
 impl RunningServer {
@@ -75,7 +86,21 @@ impl RunningServer {
 
     /// The base of its URLs.
     pub fn url(&self) -> String {
-        format!("http://{}", self.address)
+        let scheme = if self.certificate.is_some() { "https" } else { "http" };
+        format!("{scheme}://{}", self.address)
+    }
+
+    /// Takes the keys of another configuration, and reads certificates again. The rest of a configuration needs a restart.
+    ///
+    /// # Errors
+    /// [`StartError::Tls`]; then the certificate before stays, and the keys are those of the new configuration.
+    pub fn reload(&self, config: &ServerConfig) -> Result<(), StartError> {
+        self.gate.keys.configure(&config.keys);
+        tracing::info!(target: "locution::audit", event = "keys read again", num_keys = config.keys.len());
+        match (&self.certificate, &config.tls) {
+            (Some(certificate), Some(tls)) => certificate.reload(tls).map_err(StartError::Tls),
+            _ => Ok(()),
+        }
     }
 
     /// Takes no more requests, finishes those under way and closes the storage.
@@ -83,9 +108,10 @@ impl RunningServer {
     /// # Errors
     /// [`StartError::App`] when the storage could not be closed; everything acknowledged is durable anyway.
     pub async fn shutdown(self) -> Result<(), StartError> {
-        let _ = self.stop.send(true);
-        if let Ok(Err(error)) = self.serving.await {
-            tracing::warn!(%error, "the listener ended badly");
+        self.app.stop_jobs();
+        self.stop.cancel();
+        if let Err(error) = self.serving.await {
+            tracing::error!(%error, "the listener ended badly");
         }
         Ok(self.app.close().await?)
     }
@@ -101,46 +127,35 @@ pub async fn start_server(config: ServerConfig) -> Result<RunningServer, StartEr
         directory: config.data_directory.clone(),
         cache_bytes_per_site: config.storage.cache_bytes_per_site,
     })?;
+    let keys = auth::Keys::open(&config.keys, &config.data_directory)?;
+    if !config.address.ip().is_loopback() && keys.is_empty() {
+        let problem =
+            "listening beyond this machine needs a key: an entry in `keys`, or one made by the API".into();
+        return Err(ServerConfigError::Invalid { field: "address".into(), problem }.into());
+    }
     let listen = |source| StartError::Listen { address: config.address, source };
     let listener = TcpListener::bind(config.address).await.map_err(listen)?;
     let address = listener.local_addr().map_err(listen)?;
     let app = Arc::new(App::new(config.clone(), Arc::new(storage)));
     app.resume().await?;
+    let certificate = config.tls.as_ref().map(Certificate::read).transpose().map_err(StartError::Tls)?;
+    let certificate = certificate.map(Arc::new);
+    let gate = Arc::new(Gate { keys, callers: auth::LocalCallers::new(&config.web) });
     let state = AppState {
         app: Arc::clone(&app),
-        keys: Arc::new(auth::Keys::new(&config.keys)),
-        metrics: metrics_handle(),
+        gate: Arc::clone(&gate),
+        places: Arc::new(Places::new(&config.limits)),
+        metrics: telemetry::handle(),
     };
-    let (stop, mut stopped) = watch::channel(false);
-    let service = router::build_router(state);
-    // Small answers must not wait for the acknowledgement of the ones before.
-    let listener = listener.tap_io(|stream| {
-        let _ = stream.set_nodelay(true);
-    });
-    let serving = tokio::spawn(async move {
-        let until_stopped = async move {
-            let _ = stopped.wait_for(|is_stopped| *is_stopped).await;
-        };
-        axum::serve(listener, service).with_graceful_shutdown(until_stopped).await
-    });
+    let stop = CancellationToken::new();
+    let router = router::build_router(state);
+    let serving = tokio::spawn(listener::serve(
+        listener,
+        certificate.clone(),
+        router,
+        config.limits.clone(),
+        stop.clone(),
+    ));
     tracing::info!(%address, data_directory = %config.data_directory.display(), "listening");
-    Ok(RunningServer { address, app, stop, serving })
-}
-
-/// The process has one recorder; servers in one process, as in tests, share it.
-fn metrics_handle() -> PrometheusHandle {
-    static HANDLE: OnceLock<PrometheusHandle> = OnceLock::new();
-    let install = || {
-        let buckets = [0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0];
-        let recorder = PrometheusBuilder::new()
-            .set_buckets_for_metric(Matcher::Suffix("_seconds".into()), &buckets)
-            .expect("the list of buckets is not empty")
-            .build_recorder();
-        let handle = recorder.handle();
-        if metrics::set_global_recorder(recorder).is_err() {
-            tracing::warn!("another metrics recorder is installed; /metrics will stay empty");
-        }
-        handle
-    };
-    HANDLE.get_or_init(install).clone()
+    Ok(RunningServer { address, app, gate, certificate, stop, serving })
 }

@@ -1,6 +1,8 @@
 //! Every kind of bad input is refused with the place of the fault, and changes nothing.
 
 use locution_tests::{Api, TestServer, drive};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 use reqwest::Method;
 use serde_json::{Value, json};
 
@@ -162,7 +164,7 @@ async fn bodies_that_cannot_be_read() {
     post(&json, &deep).await.problem(400, "malformed-body");
     post(&[("content-type", "text/csv")], b"1,2").await.problem(415, "media-type");
     let encoded = [json[0], ("content-encoding", "br")];
-    post(&encoded, b"x").await.problem(415, "unsupported-media-type");
+    post(&encoded, b"x").await.problem(415, "coding");
     let gzip = [json[0], ("content-encoding", "gzip")];
     assert_eq!(post(&gzip, b"not gzip").await.status.as_u16() / 100, 4);
     post(&json, &vec![b' '; 2 << 20]).await.problem(413, "too-large");
@@ -208,5 +210,37 @@ async fn queries_that_cannot_be_read() {
         api.get("/v1/sites/a/runs/r/scans?cursor=18446744073709551615").await.ok()["items"],
         json!([])
     );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn damaged_bodies_are_read_or_refused_and_never_break_the_server() {
+    let server = server_with_run().await;
+    let mut rng = ChaCha8Rng::seed_from_u64(17);
+    let body = json!({"first_sequence": 50, "scans": drive(54, 1)[50..]});
+    let mut cbor = Vec::new();
+    ciborium::into_writer(&body, &mut cbor).unwrap();
+    for (media_type, whole) in
+        [("application/json", body.to_string().into_bytes()), ("application/cbor", cbor)]
+    {
+        for _ in 0..200 {
+            let mut bytes = whole.clone();
+            for _ in 0..rng.random_range(1..6) {
+                let at = rng.random_range(0..bytes.len());
+                match rng.random_range(0..4) {
+                    0 => bytes[at] = rng.random(),
+                    1 => bytes.truncate(at.max(1)),
+                    2 => bytes.insert(at, rng.random()),
+                    _ => bytes.extend_from_within(at..),
+                }
+            }
+            let headers = [("content-type", media_type)];
+            let path = "/v1/sites/a/runs/r/batches";
+            let answer = server.api.send(Method::POST, path, &headers, bytes).await.unwrap();
+            let status = answer.status.as_u16();
+            assert!([200, 400, 409, 413, 422].contains(&status), "{status}: {}", answer.text());
+        }
+    }
+    server.api.get("/v1/sites/a/runs/r").await.ok();
     server.stop().await;
 }

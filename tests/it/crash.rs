@@ -50,6 +50,21 @@ impl Process {
         self.child.id()
     }
 
+    /// SIGTERM: it may end in order, within the time given.
+    #[cfg(unix)]
+    pub(crate) fn terminate(mut self, time_max: Duration) -> std::process::ExitStatus {
+        let told = Command::new("kill").args(["-s", "TERM", &self.id().to_string()]).status().unwrap();
+        assert!(told.success());
+        let told_at = std::time::Instant::now();
+        while told_at.elapsed() < time_max {
+            if let Some(status) = self.child.try_wait().unwrap() {
+                return status;
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        panic!("it did not end");
+    }
+
     /// SIGKILL: no destructor, no flush, no goodbye.
     pub(crate) fn kill(&mut self) {
         self.child.kill().unwrap();

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
+use locution_server::config::{ApiKeyConfig, ServerConfig, TlsConfig};
 use locution_tests::{TestServer, drive, geometry, locution_binary};
 use serde_json::{Value, json};
 
@@ -147,5 +148,80 @@ async fn the_commands_of_the_readme_make_a_map() {
         .unwrap();
     assert!(drive.status.success(), "{}", String::from_utf8_lossy(&drive.stderr));
     assert_eq!(run_page("README.md", &server, directory.path()).await, 6);
+    server.stop().await;
+}
+
+fn page(name: &str) -> String {
+    std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs").join(name)).unwrap()
+}
+
+/// Paths of all values of a configuration, with dots.
+fn paths_of(value: &Value, prefix: &str, paths: &mut Vec<String>) {
+    let Value::Object(members) = value else {
+        return paths.push(prefix.to_owned());
+    };
+    for (name, member) in members {
+        let path = if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") };
+        paths_of(member, &path, paths);
+    }
+}
+
+#[test]
+fn the_page_on_configuration_names_every_key() {
+    let key = ApiKeyConfig {
+        expires_at_s: Some(1),
+        requests_per_s_max: Some(1.0),
+        num_localizations_max: Some(1),
+        ..ApiKeyConfig::default()
+    };
+    let tls = TlsConfig { certificate: "chain.pem".into(), key: "key.pem".into() };
+    let config = ServerConfig { tls: Some(tls), ..ServerConfig::default() };
+    let mut paths = Vec::new();
+    paths_of(&serde_json::to_value(&config).unwrap(), "", &mut paths);
+    paths.retain(|path| path != "keys");
+    paths_of(&serde_json::to_value(&key).unwrap(), "keys[]", &mut paths);
+    assert!(paths.len() > 30, "{paths:?}");
+    let page = page("configuration.md");
+    let missing: Vec<_> = paths.iter().filter(|path| !page.contains(&format!("| `{path}` |"))).collect();
+    assert!(missing.is_empty(), "not in docs/configuration.md: {missing:?}");
+    let shown = page.lines().filter_map(|line| line.strip_prefix("| `")?.split('`').next());
+    let unknown: Vec<_> = shown.filter(|path| !paths.iter().any(|known| known == path)).collect();
+    assert!(unknown.is_empty(), "no such key: {unknown:?}");
+}
+
+#[test]
+fn the_board_and_the_alerts_ask_only_for_metrics_that_exist() {
+    let names = locution_server::metric_names();
+    for file in ["operations/grafana.json", "operations/alerts.yaml"] {
+        let text = page(file);
+        let words = text.split(|c: char| !c.is_ascii_alphanumeric() && c != '_');
+        let asked = words.filter(|word| word.starts_with("locution_") || word.starts_with("process_"));
+        let mut num_asked = 0;
+        for word in asked {
+            num_asked += 1;
+            let name = word.trim_end_matches("_bucket");
+            assert!(names.contains(&name), "{file} asks for {word}");
+        }
+        assert!(num_asked > 5, "{file}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_metric_says_what_it_is() {
+    let server = TestServer::start().await;
+    server.api.make_run("a", "r").await;
+    server.api.post_batch("a", "r", 0, &drive(5, 1)).await.ok();
+    server.api.get("/v1/sites/none").await;
+    let text = String::from_utf8(server.api.get("/metrics").await.bytes).unwrap();
+    let types: Vec<&str> =
+        text.lines().filter_map(|line| line.strip_prefix("# TYPE ")?.split(' ').next()).collect();
+    for name in &types {
+        assert!(text.contains(&format!("# HELP {name} ")), "{name} has no HELP");
+    }
+    for wanted in
+        ["locution_scans_total", "locution_refusals_total", "locution_build_info", "locution_storage_bytes"]
+    {
+        assert!(types.contains(&wanted), "{wanted} is missing in {types:?}");
+    }
     server.stop().await;
 }

@@ -86,6 +86,7 @@ fn describe(secret: &[u8; 32], new: &NewKeyArguments) -> Result<(String, String)
         sha256: hexadecimal(&Sha256::digest(key.as_bytes())),
         scope: new.scope.into(),
         sites: new.sites.clone(),
+        ..ApiKeyConfig::default()
     };
     Ok((key, toml::to_string(&Keys { keys: [entry] })?))
 }

@@ -1,5 +1,6 @@
 //! `locution serve`: the server in the foreground until it is told to stop.
 
+use std::io::IsTerminal;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -13,7 +14,7 @@ use tracing_subscriber::layer::SubscriberExt;
 use tracing_subscriber::util::SubscriberInitExt;
 
 use locution_server::config::{LogConfig, ServerConfig};
-use locution_server::start_server;
+use locution_server::{StartError, start_server};
 
 /// Flags win over the environment (`LOCUTION_…`), which wins over the file.
 #[derive(Debug, Args, Serialize)]
@@ -41,7 +42,8 @@ pub struct ServeArguments {
 /// # Errors
 /// A configuration that cannot work, a data directory or an address that cannot be used.
 pub fn run(arguments: ServeArguments) -> anyhow::Result<()> {
-    let config = ServerConfig::load(arguments.config.as_deref(), &arguments).context("configuration")?;
+    let load = || ServerConfig::load(arguments.config.as_deref(), &arguments);
+    let config = load().context("configuration")?;
     if arguments.print_config {
         print!("{}", toml::to_string(&config)?);
         return Ok(());
@@ -52,7 +54,14 @@ pub fn run(arguments: ServeArguments) -> anyhow::Result<()> {
         let server = start_server(config).await?;
         // Scripts that start the server on port 0 read the address here.
         println!("listening on {}", server.url());
-        until_interrupted().await?;
+        until_interrupted(|| {
+            let outcome = load().map_err(StartError::from).and_then(|config| server.reload(&config));
+            match outcome {
+                Ok(()) => tracing::info!("the configuration was read again"),
+                Err(error) => tracing::error!(%error, "the configuration could not be read again"),
+            }
+        })
+        .await?;
         tracing::info!("stopping");
         Ok(server.shutdown().await?)
     });
@@ -64,22 +73,33 @@ pub fn run(arguments: ServeArguments) -> anyhow::Result<()> {
 /// Logs go to standard error, so that standard output stays for answers.
 fn start_logging(config: &LogConfig) -> anyhow::Result<()> {
     let filter: Targets = config.filter.parse().context("log.filter")?;
-    let layer = tracing_subscriber::fmt::layer().with_writer(std::io::stderr);
+    // Colours are for people; a file or another program gets plain text.
+    let is_colored = std::io::stderr().is_terminal();
+    let layer = tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_ansi(is_colored);
     let layer = if config.is_json { layer.json().boxed() } else { layer.boxed() };
     // A second start in one process, as in tests, keeps the first subscriber.
     let _ = tracing_subscriber::registry().with(layer.with_filter(filter)).try_init();
     Ok(())
 }
 
-async fn until_interrupted() -> std::io::Result<()> {
+/// Returns when the process is told to end; does `reload` whenever it is told to read its configuration again.
+async fn until_interrupted(reload: impl Fn()) -> std::io::Result<()> {
     #[cfg(unix)]
     {
-        let mut terminated = tokio::signal::unix::signal(tokio::signal::unix::SignalKind::terminate())?;
-        tokio::select! {
-            outcome = tokio::signal::ctrl_c() => outcome,
-            _ = terminated.recv() => Ok(()),
+        use tokio::signal::unix::{SignalKind, signal};
+        let mut terminated = signal(SignalKind::terminate())?;
+        let mut hung_up = signal(SignalKind::hangup())?;
+        loop {
+            tokio::select! {
+                outcome = tokio::signal::ctrl_c() => return outcome,
+                _ = terminated.recv() => return Ok(()),
+                _ = hung_up.recv() => reload(),
+            }
         }
     }
     #[cfg(not(unix))]
-    tokio::signal::ctrl_c().await
+    {
+        let _ = reload;
+        tokio::signal::ctrl_c().await
+    }
 }

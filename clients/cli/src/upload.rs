@@ -118,7 +118,9 @@ pub async fn build_with_progress(client: &Client, site: &str) -> Result<()> {
     loop {
         match job.state {
             JobState::Done => break,
-            JobState::Failed => bail!("the map could not be built: {}", job.error.unwrap_or(job.detail)),
+            JobState::Failed | JobState::Cancelled => {
+                bail!("the map could not be built: {}", job.error.unwrap_or(job.detail))
+            }
             JobState::Queued | JobState::Running => {}
         }
         bar.set_position((1000.0 * job.progress) as u64);

@@ -160,6 +160,23 @@ impl Client {
             .map_err(|error| ClientError::Answer { path: path.clone(), problem: error.to_string() })
     }
 
+    /// The JSON answer of an operation that may have nothing to say.
+    pub(crate) async fn answer_if_any<T: DeserializeOwned>(
+        &self,
+        route: &Route,
+        names: &[&str],
+    ) -> Result<Option<T>, ClientError> {
+        let path = route.with(names);
+        let response = self.send(route.method.clone(), &path, "application/json", Body::Empty).await?;
+        let bytes = response.bytes().await.map_err(ClientError::Transport)?;
+        if bytes.is_empty() {
+            return Ok(None);
+        }
+        serde_json::from_slice(&bytes)
+            .map(Some)
+            .map_err(|error| ClientError::Answer { path, problem: error.to_string() })
+    }
+
     /// The JSON answer of an operation that only looks.
     pub(crate) async fn get<T: DeserializeOwned>(
         &self,

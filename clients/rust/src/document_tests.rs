@@ -83,13 +83,13 @@ fn bodies_have_every_member_of_the_document() {
         )*};
     }
     check! {
-        Change ChangeKind Channel Component Connection ConnectionKind DecisionKind Direction Evidence
-        ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval Job JobKind
+        Change ChangeKind ChangedSite Channel Component Connection ConnectionKind DecisionKind Direction Event
+        Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval Job JobKind
         JobState KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
         MapRun MapStatistics Match MatchState Missing NewLocalization NewRun Observation Place PlaceLabel Point
-        Pose PosePrior Receipt Region Registration RejectionReason Route RouteStep RouteTurn Run RunState Scan
-        Site SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word WordAnswer WordId WordPattern
-        WordQuery
+        Pose PosePrior Receipt Region Registration RejectionReason Retention Route RouteStep RouteTurn Run
+        RunChange RunState Scan Site SiteChange SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word
+        WordAnswer WordId WordPattern WordQuery
     }
     assert_complete::<error::Problem>(&document, "Problem");
     // Bodies that only this crate writes, and the wrappers of lists.

@@ -37,6 +37,14 @@ impl Client {
         self.get(&routes::GET_JOB, &[site, id], &Query::default()).await
     }
 
+    /// Cancels a job; answers it as it ended, or as it stands.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn cancel_job(&self, site: &str, id: &str) -> Result<Job, ClientError> {
+        self.answer(&routes::CANCEL_JOB, &[site, id], &Query::default(), Body::Empty).await
+    }
+
     /// All jobs that are remembered, the newest first.
     ///
     /// # Errors
@@ -48,13 +56,13 @@ impl Client {
     /// Waits until a job is done.
     ///
     /// # Errors
-    /// See [`ClientError`]; a job that failed.
+    /// See [`ClientError`]; a job that failed or was cancelled.
     pub async fn finished(&self, site: &str, job: Job) -> Result<Job, ClientError> {
         let mut job = job;
         loop {
             match job.state {
                 JobState::Done => return Ok(job),
-                JobState::Failed => {
+                JobState::Failed | JobState::Cancelled => {
                     return Err(ClientError::JobFailed {
                         id: job.id,
                         error: job.error.unwrap_or(job.detail),

@@ -26,6 +26,7 @@
 
 mod client;
 mod error;
+mod events;
 mod jobs;
 mod localizations;
 mod maps;
@@ -43,7 +44,8 @@ mod document_tests;
 
 pub use client::{Client, RetryPolicy};
 pub use error::{ClientError, Problem};
+pub use events::Events;
 pub use maps::{MapAt, MapForm};
-pub use matches::MatchFilter;
+pub use matches::{MatchFilter, MatchOrder};
 pub use types::*;
 pub use upload::{Encoding, RunUpload};

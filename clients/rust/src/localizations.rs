@@ -27,6 +27,14 @@ impl Client {
         self.get(&routes::GET_LOCALIZATION, &[site, id], &Query::default()).await
     }
 
+    /// All localisations that are open in a site, the oldest first.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn localizations(&self, site: &str) -> Result<Vec<Localization>, ClientError> {
+        self.all(&routes::LIST_LOCALIZATIONS, &[site], Query::default()).await
+    }
+
     /// Adds scans and answers where the robot now may be.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::client::{Body, Client};
 use crate::error::ClientError;
 use crate::routes::{self, Query};
-use crate::types::{Channel, DecisionKind, Direction, Match, MatchState};
+use crate::types::{Channel, DecisionKind, Direction, Match, MatchState, Point};
 
 /// Which matches to list; what is `None` may be anything.
 #[derive(Clone, Debug, Default)]
@@ -18,8 +18,46 @@ pub struct MatchFilter {
     pub direction: Option<Direction>,
     /// Name of a run that takes part.
     pub run: Option<String>,
+    /// Component of the map in which one of its stretches lies.
+    pub component: Option<u32>,
+    /// What a person said of it.
+    pub decision: Option<DecisionKind>,
+    /// Least probability.
+    pub probability_min: Option<f64>,
+    /// Greatest probability.
+    pub probability_max: Option<f64>,
+    /// Driven not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Driven before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Two opposite corners of a rectangle in the map, metres.
+    pub area: Option<(Point, Point)>,
+    /// In which order; as the version numbers them unless said.
+    pub order: MatchOrder,
     /// Version of the map; the serving one unless said.
     pub version: Option<u64>,
+}
+
+/// In which order matches are listed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum MatchOrder {
+    /// As the version numbers them.
+    #[default]
+    Number,
+    /// The most probable first.
+    Probability,
+    /// The latest revisit first.
+    Time,
+}
+
+impl MatchOrder {
+    const fn as_str(self) -> &'static str {
+        match self {
+            Self::Number => "id",
+            Self::Probability => "probability",
+            Self::Time => "time",
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -38,6 +76,14 @@ impl Client {
             .and("channel", filter.channel.map(Channel::as_str))
             .and("direction", filter.direction.map(Direction::as_str))
             .and("run", filter.run.as_ref())
+            .and("component", filter.component)
+            .and("decision", filter.decision.map(DecisionKind::as_str))
+            .and("probability_min", filter.probability_min)
+            .and("probability_max", filter.probability_max)
+            .and("from_ns", filter.from_ns)
+            .and("to_ns", filter.to_ns)
+            .and("area", filter.area.map(|(a, b)| format!("{},{},{},{}", a.x, a.y, b.x, b.y)))
+            .and("sort", Some(filter.order.as_str()))
             .and("version", filter.version);
         self.all(&routes::LIST_MATCHES, &[site], query).await
     }

@@ -69,4 +69,12 @@ impl Client {
     ) -> Result<Vec<LabelAnswer>, ClientError> {
         self.answer(&routes::QUERY_LABELS, &[site], &Query::default(), Body::json(query)?).await
     }
+
+    /// The same in all sites that the key may see, the surest first.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn query_labels_everywhere(&self, query: &LabelQuery) -> Result<Vec<LabelAnswer>, ClientError> {
+        self.answer(&routes::QUERY_LABELS_EVERYWHERE, &[], &Query::default(), Body::json(query)?).await
+    }
 }

@@ -73,12 +73,15 @@ routes! {
     LIST_SITES "list_sites" GET "/v1/sites";
     GET_SITE "get_site" GET "/v1/sites/{site}";
     MAKE_SITE "make_site" PUT "/v1/sites/{site}";
+    CHANGE_SITE "change_site" PATCH "/v1/sites/{site}";
     DELETE_SITE "delete_site" DELETE "/v1/sites/{site}";
     BACKUP_SITE "backup_site" GET "/v1/sites/{site}/backup";
     RESTORE_SITE "restore_site" PUT "/v1/sites/{site}/backup";
+    WATCH_SITE "watch_site" GET "/v1/sites/{site}/events";
     LIST_RUNS "list_runs" GET "/v1/sites/{site}/runs";
     GET_RUN "get_run" GET "/v1/sites/{site}/runs/{run}";
     MAKE_RUN "make_run" PUT "/v1/sites/{site}/runs/{run}";
+    DELETE_RUN "delete_run" DELETE "/v1/sites/{site}/runs/{run}";
     FINISH_RUN "finish_run" POST "/v1/sites/{site}/runs/{run}/finish";
     APPEND_BATCH "append_batch" POST "/v1/sites/{site}/runs/{run}/batches";
     LIST_SCANS "list_scans" GET "/v1/sites/{site}/runs/{run}/scans";
@@ -89,6 +92,7 @@ routes! {
     BUILD_MAP "build_map" POST "/v1/sites/{site}/builds";
     LIST_JOBS "list_jobs" GET "/v1/sites/{site}/jobs";
     GET_JOB "get_job" GET "/v1/sites/{site}/jobs/{id}";
+    CANCEL_JOB "cancel_job" DELETE "/v1/sites/{site}/jobs/{id}";
     LIST_MATCHES "list_matches" GET "/v1/sites/{site}/matches";
     GET_MATCH "get_match" GET "/v1/sites/{site}/matches/{id}";
     DECIDE_MATCH "decide_match" PUT "/v1/sites/{site}/matches/{id}/decision";
@@ -103,6 +107,7 @@ routes! {
     GET_PICTURE_PNG "get_picture_png" GET "/v1/sites/{site}/map/picture.png";
     GET_PICTURE_SVG "get_picture_svg" GET "/v1/sites/{site}/map/picture.svg";
     OPEN_LOCALIZATION "open_localization" POST "/v1/sites/{site}/localisations";
+    LIST_LOCALIZATIONS "list_localizations" GET "/v1/sites/{site}/localisations";
     GET_LOCALIZATION "get_localization" GET "/v1/sites/{site}/localisations/{id}";
     CLOSE_LOCALIZATION "close_localization" DELETE "/v1/sites/{site}/localisations/{id}";
     APPEND_LOCALIZATION_BATCH "append_localization_batch" POST "/v1/sites/{site}/localisations/{id}/batches";
@@ -111,6 +116,7 @@ routes! {
     QUERY_WORDS "query_words" POST "/v1/sites/{site}/queries/words";
     QUERY_WORDS_EVERYWHERE "query_words_everywhere" POST "/v1/queries/words";
     QUERY_LABELS "query_labels" POST "/v1/sites/{site}/queries/labels";
+    QUERY_LABELS_EVERYWHERE "query_labels_everywhere" POST "/v1/queries/labels";
     LIST_LABELS "list_labels" GET "/v1/sites/{site}/labels";
     LIST_PLACES "list_places" GET "/v1/sites/{site}/places";
     GET_ROUTE "get_route" GET "/v1/sites/{site}/route";

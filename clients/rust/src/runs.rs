@@ -3,7 +3,7 @@
 use crate::client::{Body, Client};
 use crate::error::ClientError;
 use crate::routes::{self, Query};
-use crate::types::{Frame, NewRun, Observation, Run, StoredScan, Trajectory, Word};
+use crate::types::{Frame, Job, NewRun, Observation, Run, StoredScan, Trajectory, Word};
 
 impl Client {
     /// Makes a run, or finds it as it stands.
@@ -28,6 +28,14 @@ impl Client {
     /// See [`ClientError`].
     pub async fn runs(&self, site: &str) -> Result<Vec<Run>, ClientError> {
         self.all(&routes::LIST_RUNS, &[site], Query::default()).await
+    }
+
+    /// Forgets a run with all its traces; answers the job that makes the map without it, when there is a map.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn delete_run(&self, site: &str, run: &str) -> Result<Option<Job>, ClientError> {
+        self.answer_if_any(&routes::DELETE_RUN, &[site, run]).await
     }
 
     /// Says that no more scans will come, so that delayed observations and pending words are written.

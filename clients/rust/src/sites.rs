@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::client::{Body, Client};
 use crate::error::ClientError;
 use crate::routes::{self, Query};
-use crate::types::{Site, SiteSummary};
+use crate::types::{ChangedSite, Site, SiteChange, SiteSummary};
 
 #[derive(Serialize)]
 struct NewSite<'a> {
@@ -40,6 +40,14 @@ impl Client {
     /// See [`ClientError`].
     pub async fn sites(&self) -> Result<Vec<SiteSummary>, ClientError> {
         self.all(&routes::LIST_SITES, &[], Query::default()).await
+    }
+
+    /// Changes a site's configuration or how much of it is kept.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 422 for what cannot be changed.
+    pub async fn change_site(&self, site: &str, change: &SiteChange) -> Result<ChangedSite, ClientError> {
+        self.answer(&routes::CHANGE_SITE, &[site], &Query::default(), Body::json(change)?).await
     }
 
     /// Deletes a site with everything in it.

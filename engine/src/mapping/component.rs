@@ -9,8 +9,8 @@ use super::memo::RegistrationMemo;
 use super::place_match::{Channel, RejectionReason};
 use super::refusals::Refusal;
 use super::site_anchors::SiteAnchors;
+use super::watch::{MappingError, Span};
 use super::ways::Way;
-use crate::pose_graph::PoseGraphError;
 use crate::registration::Opinions;
 
 /// Runs that share a frame.
@@ -23,20 +23,28 @@ pub(crate) struct Component<'a> {
     pub refused: Vec<Refusal>,
 }
 
-/// What stays the same while a map is being built.
+/// What stays the same while a map is being built, and which part of that is at hand.
 #[derive(Clone, Copy)]
 pub(crate) struct Workshop<'a> {
     pub site: &'a SiteAnchors<'a>,
     pub judgements: &'a Judgements<'a>,
     pub memo: &'a RegistrationMemo,
+    pub span: Span<'a>,
+}
+
+impl Workshop<'_> {
+    /// For one of equal parts of the work.
+    pub fn part(self, idx: usize, num_parts: usize) -> Self {
+        Self { span: self.span.part(idx, num_parts), ..self }
+    }
 }
 
 impl<'a> Component<'a> {
     /// A run on its own, settled.
     ///
     /// # Errors
-    /// Whatever the graph cannot solve.
-    pub fn alone(workshop: Workshop<'a>, run: RunIdx) -> Result<Self, PoseGraphError> {
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn alone(workshop: Workshop<'a>, run: RunIdx) -> Result<Self, MappingError> {
         let site = workshop.site;
         let mut graph = CoarseGraph::new(site, vec![run], |anchor| site.anchor(anchor).run_from_anchor)?;
         graph.optimize(&[])?;
@@ -48,12 +56,13 @@ impl<'a> Component<'a> {
     /// Guided matching and optimization in turns, until nothing new is found.
     ///
     /// # Errors
-    /// Whatever the graph cannot solve.
-    pub fn settle(&mut self, workshop: Workshop<'a>) -> Result<(), PoseGraphError> {
-        let Workshop { site, judgements, memo } = workshop;
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn settle(&mut self, workshop: Workshop<'a>) -> Result<(), MappingError> {
+        let Workshop { site, judgements, memo, span } = workshop;
         let may_match = |a, b| site.may_match(a, b) && !judgements.forbid(a, b);
-        for _ in 0..site.config.max_rounds {
-            let round = guided_round(&self.graph, &may_match, memo)?;
+        let max_rounds = site.config.max_rounds;
+        for round in 0..max_rounds {
+            let round = guided_round(&self.graph, &may_match, memo, span.part(round, max_rounds))?;
             let kept = self.graph.optimize(&round.closures)?;
             let (found, dropped) = sorted_out(round.closures, &kept);
             let refusal = |closure| Refusal {
@@ -87,13 +96,13 @@ impl<'a> Component<'a> {
     /// speaks for and against it; none when it falls apart at once.
     ///
     /// # Errors
-    /// Whatever the graph cannot solve.
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
     pub fn laid_over(
         host: &Self,
         guest: &Self,
         way: &Way,
         workshop: Workshop<'a>,
-    ) -> Result<Option<(Self, JoinEvidence)>, PoseGraphError> {
+    ) -> Result<Option<(Self, JoinEvidence)>, MappingError> {
         let mut both = Self::side_by_side(host, guest, way)?;
         let inside = [host.closures.as_slice(), &guest.closures].concat();
         let mut across = way.closures.clone();
@@ -109,7 +118,7 @@ impl<'a> Component<'a> {
             if is_last {
                 both.closures = sorted_out(closures, &kept).0;
             } else {
-                let round = guided_round(&both.graph, &may_match, workshop.memo)?;
+                let round = guided_round(&both.graph, &may_match, workshop.memo, workshop.span)?;
                 (across, tried) = (round.closures, round.tried);
             }
         }
@@ -117,7 +126,7 @@ impl<'a> Component<'a> {
         Ok(Some((both, evidence)))
     }
 
-    fn side_by_side(host: &Self, guest: &Self, way: &Way) -> Result<Self, PoseGraphError> {
+    fn side_by_side(host: &Self, guest: &Self, way: &Way) -> Result<Self, MappingError> {
         let runs = [host.graph.runs(), guest.graph.runs()].concat();
         let pose_of = |anchor: AnchorIdx| match host.graph.holds(anchor) {
             true => host.graph.pose(anchor),

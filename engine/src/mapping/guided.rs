@@ -9,8 +9,8 @@ use super::config::MappingConfig;
 use super::indices::AnchorIdx;
 use super::memo::{RegistrationMemo, Request};
 use super::site_anchors::SiteAnchors;
+use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
-use crate::pose_graph::PoseGraphError;
 use crate::registration::{SearchWindow, SubmapFit};
 
 /// A pair of anchors that the graph places near each other.
@@ -46,16 +46,17 @@ pub(crate) fn is_fit(fit: &SubmapFit, is_one_drive: bool, config: &MappingConfig
 /// Registers all neighbors of one graph that may be matched, and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
-/// Whatever the graph cannot solve.
+/// Whatever the graph cannot solve; [`MappingError::Stopped`].
 pub(crate) fn guided_round(
     graph: &CoarseGraph<'_>,
     may_match: &impl Fn(AnchorIdx, AnchorIdx) -> bool,
     memo: &RegistrationMemo,
-) -> Result<GuidedRound, PoseGraphError> {
+    span: Span<'_>,
+) -> Result<GuidedRound, MappingError> {
     let (site, config) = (graph.site, graph.site.config);
-    let neighbors = find_neighbors(graph, may_match)?;
+    let neighbors = find_neighbors(graph, may_match, span.part(0, 2))?;
     let requests: Vec<Request> = neighbors.iter().map(|pair| pair.request).collect();
-    let fits = memo.answers(&requests, site);
+    let fits = memo.answers(&requests, site, span.part(1, 2))?;
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
@@ -85,12 +86,14 @@ pub(crate) fn guided_round(
 fn find_neighbors(
     graph: &CoarseGraph<'_>,
     may_match: &impl Fn(AnchorIdx, AnchorIdx) -> bool,
-) -> Result<Vec<Neighbors>, PoseGraphError> {
+    span: Span<'_>,
+) -> Result<Vec<Neighbors>, MappingError> {
     let config = graph.site.config;
     let mut solver = graph.covariances()?;
     let mut found = Vec::new();
     let mut nearby = Nearby::new(config.neighbor_distance_m + config.max_search_m);
-    for &later in graph.anchors() {
+    for (idx, &later) in graph.anchors().iter().enumerate() {
+        span.done(idx, graph.anchors().len())?;
         let here = graph.pose(later);
         let distance_m = |anchor: AnchorIdx| graph.pose(anchor).distance(&here);
         let mut near = nearby.around(&here);

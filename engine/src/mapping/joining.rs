@@ -15,9 +15,9 @@ use super::join_evidence::JoinEvidence;
 use super::null::Null;
 use super::place_match::{Channel, PlaceMatch, RejectionReason};
 use super::refusals::{Refusal, unfit_matches};
+use super::watch::MappingError;
 use super::ways::{Groups, Registered, Way};
 use crate::geometry::Pose2;
-use crate::pose_graph::PoseGraphError;
 
 /// What joining made of the runs.
 pub(crate) struct Joined<'a> {
@@ -45,21 +45,25 @@ impl Proposal<'_> {
 /// Lays components over each other, the surest first, as long as one convinces.
 ///
 /// # Errors
-/// Whatever the graph cannot solve.
+/// Whatever the graph cannot solve; [`MappingError::Stopped`].
 pub(crate) fn join<'a>(
     alone: Vec<Component<'a>>,
     workshop: Workshop<'a>,
-) -> Result<Joined<'a>, PoseGraphError> {
+) -> Result<Joined<'a>, MappingError> {
     let candidates: Vec<Candidate> = candidates_across(workshop.site)
         .into_iter()
         .filter(|candidate| !workshop.judgements.forbid(candidate.earlier, candidate.later))
         .collect();
-    let null = Null::of(&alone, workshop);
+    let null = Null::of(&alone, workshop.part(0, 3))?;
     let mut joiner = Joiner::new(alone, &candidates, null, workshop);
     let mut proposals = joiner.proposals(|_, _| true);
+    let mut num_proposals = proposals.len();
     while let Some(proposal) = proposals.pop() {
+        let num_left = proposals.len() + 1;
+        num_proposals = num_proposals.max(num_left);
         let (host, guest) = (proposal.host, proposal.guest);
-        if !joiner.try_join(&proposal)? {
+        let laying = workshop.part(1, 3).part(num_proposals - num_left, num_proposals);
+        if !joiner.try_join(&proposal, laying)? {
             continue;
         }
         // Every pair that one of the two belongs to is another question now.
@@ -128,10 +132,10 @@ impl<'a, 'c> Joiner<'a, 'c> {
 
     /// Joins two components if one of the ways to do so holds and no other holds nearly as well; otherwise everything
     /// stays as it was.
-    fn try_join(&mut self, proposal: &Proposal<'c>) -> Result<bool, PoseGraphError> {
+    fn try_join(&mut self, proposal: &Proposal<'c>, workshop: Workshop<'a>) -> Result<bool, MappingError> {
         let (host, guest) = (&self.components[&proposal.host], &self.components[&proposal.guest]);
-        let registered = proposal.groups.ways(self.workshop);
-        let verdict = judged(&registered.ways, host, guest, &self.null, self.workshop)?;
+        let registered = proposal.groups.ways(workshop.part(0, 2))?;
+        let verdict = judged(&registered.ways, host, guest, &self.null, workshop.part(1, 2))?;
         let Registered { fits, unfit, .. } = registered;
         self.fits.extend(fits);
         self.unfit.extend(unfit.into_iter().map(|candidate| {
@@ -157,10 +161,10 @@ impl<'a, 'c> Joiner<'a, 'c> {
     }
 
     /// Settles what has grown, and lists the registrations between runs that the finished map does not bear out.
-    fn finish(mut self) -> Result<Joined<'a>, PoseGraphError> {
+    fn finish(mut self) -> Result<Joined<'a>, MappingError> {
         for run in &self.grown {
             if let Some(component) = self.components.get_mut(run) {
-                component.settle(self.workshop)?;
+                component.settle(self.workshop.part(2, 3))?;
             }
         }
         let first_of = |closure: &Closure| {
@@ -201,11 +205,11 @@ fn judged<'a>(
     guest: &Component<'a>,
     null: &Null,
     workshop: Workshop<'a>,
-) -> Result<Verdict<'a>, PoseGraphError> {
+) -> Result<Verdict<'a>, MappingError> {
     let config = workshop.site.config;
     let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
-    for way in different(ways, guest).into_iter().take(config.max_hypotheses) {
-        let found = Component::laid_over(host, guest, way, workshop)?;
+    for (idx, way) in different(ways, guest).into_iter().take(config.max_hypotheses).enumerate() {
+        let found = Component::laid_over(host, guest, way, workshop.part(idx, config.max_hypotheses))?;
         laid.extend(found.map(|(both, evidence)| (evidence, both)));
     }
     let (mut holding, others): (Vec<_>, Vec<_>) =

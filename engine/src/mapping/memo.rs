@@ -1,12 +1,15 @@
 //! Remembers registrations, so that a rebuild only computes what is new.
 
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::indices::AnchorIdx;
 use super::site_anchors::SiteAnchors;
+use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
 use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
 
@@ -24,7 +27,7 @@ pub(crate) struct Request {
 type Key = (u64, u64, [i32; 5]);
 
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
     fits: Mutex<HashMap<Key, Option<SubmapFit>>>,
     config: Option<SubmapConfig>,
@@ -52,7 +55,15 @@ impl RegistrationMemo {
     /// Answers in the order of the requests; what is not remembered is computed in parallel.
     ///
     /// Windows are rounded first, so that a map that moved a little asks the same question again.
-    pub(crate) fn answers(&self, requests: &[Request], site: &SiteAnchors<'_>) -> Vec<Option<SubmapFit>> {
+    ///
+    /// # Errors
+    /// [`MappingError::Stopped`]; what was computed before is remembered.
+    pub(crate) fn answers(
+        &self,
+        requests: &[Request],
+        site: &SiteAnchors<'_>,
+        span: Span<'_>,
+    ) -> Result<Vec<Option<SubmapFit>>, MappingError> {
         let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, site)).collect();
         let mut missing: Vec<(Key, Request)> = {
             let fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
@@ -60,16 +71,19 @@ impl RegistrationMemo {
         };
         missing.sort_by_key(|(key, _)| *key);
         missing.dedup_by_key(|(key, _)| *key);
+        let num_done = AtomicUsize::new(0);
         let computed: Vec<(Key, Option<SubmapFit>)> = missing
             .par_iter()
-            .map(|(key, request)| {
+            .filter_map(|(key, request)| {
+                span.done(num_done.fetch_add(1, Ordering::Relaxed), missing.len()).ok()?;
                 let (earlier, later) = (site.submap(request.earlier), site.submap(request.later));
-                (*key, register(earlier, later, &request.window, &site.config.submap))
+                Some((*key, register(earlier, later, &request.window, &site.config.submap)))
             })
             .collect();
         let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
         fits.extend(computed);
-        keyed.iter().map(|(key, _)| fits.get(key).copied().flatten()).collect()
+        span.done(1, 1)?;
+        Ok(keyed.iter().map(|(key, _)| fits.get(key).copied().flatten()).collect())
     }
 }
 

@@ -24,16 +24,18 @@ mod site_anchors;
 mod site_map;
 mod stretches;
 mod text_evidence;
+mod watch;
 mod ways;
 
 pub use changes::{Change, ChangeKind, ChangesConfig, PlacedRun, find_changes};
 pub use config::MappingConfig;
-pub use mapper::map_site;
+pub use mapper::{map_site, map_site_watched};
 pub use memo::RegistrationMemo;
 pub use place_match::{Channel, Decision, Evidence, MatchState, PlaceMatch, Registration, RejectionReason};
 pub use placement::place_observations;
 pub use run::{Keyframe, RunRecord};
 pub use site_map::{MappedRun, SiteMap};
 pub use text_evidence::weigh_texts;
+pub use watch::{MapStage, MapStep, MappingError, Watch};
 
 pub use crate::text::{Direction, Interval};

@@ -12,6 +12,7 @@ use super::config::MappingConfig;
 use super::indices::AnchorIdx;
 use super::join_evidence::{BESIDE_M, JoinEvidence};
 use super::overlap::overlap;
+use super::watch::MappingError;
 use super::ways::{Groups, Way};
 use crate::geometry::Pose2;
 use crate::registration::Opinions;
@@ -36,10 +37,15 @@ struct WrongWay {
 
 impl Null {
     /// Lays every run over itself in the wrong ways that its candidates propose.
-    pub fn of(alone: &[Component<'_>], workshop: Workshop<'_>) -> Self {
-        let of_run = |component: &Component<'_>| wrong_ways(component, workshop);
-        let ways: Vec<Vec<WrongWay>> = alone.par_iter().map(of_run).collect();
-        Self { ways: ways.into_iter().flatten().collect() }
+    ///
+    /// # Errors
+    /// [`MappingError::Stopped`].
+    pub fn of(alone: &[Component<'_>], workshop: Workshop<'_>) -> Result<Self, MappingError> {
+        let of_run = |(idx, component): (usize, &Component<'_>)| {
+            wrong_ways(component, workshop.part(idx, alone.len()))
+        };
+        let ways = alone.par_iter().enumerate().map(of_run).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { ways: ways.into_iter().flatten().collect() })
     }
 
     /// True when a wrong way of this building reaches about as far and is contradicted as little.
@@ -52,7 +58,7 @@ impl Null {
     }
 }
 
-fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Vec<WrongWay> {
+fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Result<Vec<WrongWay>, MappingError> {
     let (graph, site) = (&component.graph, workshop.site);
     let mut candidates = Vec::new();
     for &run in graph.runs() {
@@ -60,8 +66,8 @@ fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Vec<WrongWay
     }
     let apart_m = site.config.neighbor_distance_m;
     candidates.retain(|found| graph.pose(found.earlier).distance(&graph.pose(found.later)) > apart_m);
-    let registered = Groups::new(component, component, &candidates).ways(workshop);
-    registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way)).collect()
+    let registered = Groups::new(component, component, &candidates).ways(workshop)?;
+    Ok(registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way)).collect())
 }
 
 /// The component laid over itself, moved as a whole.

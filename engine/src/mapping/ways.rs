@@ -16,6 +16,7 @@ use super::component::{Component, Workshop};
 use super::guided::is_fit;
 use super::indices::AnchorIdx;
 use super::memo::Request;
+use super::watch::MappingError;
 use crate::geometry::Pose2;
 use crate::registration::{SearchWindow, SubmapFit, rotated};
 
@@ -166,13 +167,17 @@ impl<'c> Groups<'c> {
 
     /// Registers a few members of every group, and returns the ways that these bear out, those with most anchors
     /// first, with the fits of all and the candidates that do not fit.
-    pub fn ways(&self, workshop: Workshop<'_>) -> Registered<'c> {
+    ///
+    /// # Errors
+    /// [`MappingError::Stopped`].
+    pub fn ways(&self, workshop: Workshop<'_>) -> Result<Registered<'c>, MappingError> {
         let config = workshop.site.config;
         let mut found = Registered::default();
-        for group in &self.groups {
+        for (idx, group) in self.groups.iter().enumerate() {
+            let span = workshop.span.part(idx, self.groups.len());
             let chosen = spread_out(group, config.max_probes);
             let requests: Vec<Request> = chosen.iter().map(|claim| request(claim.candidate)).collect();
-            let fits = workshop.memo.answers(&requests, workshop.site);
+            let fits = workshop.memo.answers(&requests, workshop.site, span)?;
             let mut fitting = Vec::new();
             for (claim, fit) in chosen.iter().zip(fits) {
                 match fit.filter(|fit| is_fit(fit, false, config)) {
@@ -185,7 +190,7 @@ impl<'c> Groups<'c> {
             found.ways.extend(way.filter(|way| way.num_anchors >= config.min_seeds));
         }
         found.ways.sort_by_key(|way| Reverse(way.num_anchors));
-        found
+        Ok(found)
     }
 }
 

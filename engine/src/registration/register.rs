@@ -1,6 +1,7 @@
 //! Registration of two submaps: search, then alignment, then what the two say of each other.
 
 use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
 
 use super::branch_and_bound::SearchWindow;
 use super::config::SubmapConfig;
@@ -11,7 +12,7 @@ use super::submap::Submap;
 use crate::geometry::{Point2, Pose2};
 
 /// How two submaps fit.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SubmapFit {
     /// Pose of the later submap seen from the earlier one.
     pub earlier_from_later: Pose2,

@@ -61,6 +61,9 @@ pub enum AppError {
         /// When to ask again.
         retry_after: Duration,
     },
+    /// The work was ended before it was done: the server stops, its site is deleted, or somebody cancelled it.
+    #[error("this was ended before it was done, since the server stops or the site is deleted")]
+    Stopping,
     #[error(transparent)]
     Storage(#[from] StorageError),
     /// A bug of ours.

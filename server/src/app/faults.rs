@@ -6,6 +6,7 @@ use locution_engine::geometry::Pose2;
 use locution_engine::scan::{Scan, ScanGeometry};
 
 use super::runs::{NewBatch, NewRun};
+use super::site::Site;
 use super::{App, AppError, Name};
 use crate::config::ServerConfig;
 use crate::records::{JobKind, JobState};
@@ -55,6 +56,15 @@ async fn insist<T>(what: &str, mut ask: impl AsyncFnMut() -> Result<T, AppError>
         }
     }
     panic!("{what}: failed {NUM_ATTEMPTS} times")
+}
+
+/// A run of so many scans, finished.
+pub(super) async fn drive(app: &Arc<App>, site: &Arc<Site>, run: &Name, num_scans: usize) {
+    let new = NewRun { robot: None, geometry: geometry() };
+    app.make_run(site, run, new).await.unwrap();
+    let batch = NewBatch { first_sequence: 0, scans: scans()[..num_scans].to_vec() };
+    app.append_batch(Arc::clone(site), run, batch).await.unwrap();
+    app.finish_run(Arc::clone(site), run).await.unwrap();
 }
 
 /// One recording, one map; everything that can be read afterwards.

@@ -16,7 +16,7 @@ use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::semantics::{LabelPattern, PlaceLabel};
 
 use super::ask::find_words;
-use super::maps::{MatchFilter, decide, find_labels, matches, undecide};
+use super::maps::{MatchFilter, MatchOrder, decide, find_labels, matches, undecide};
 use super::runs::{Frame, NewBatch, NewRun, trajectory};
 use super::site::Site;
 use super::{App, AppError, Name};
@@ -303,7 +303,7 @@ impl Stage {
     /// Verified matches, and those that a person spoke of.
     async fn matches(&self) -> Result<String, AppError> {
         let map = self.site().await?.map(None).await?;
-        let (found, _) = matches(&map, &MatchFilter::default(), 0, usize::MAX).await?;
+        let (found, _) = matches(&map, &MatchFilter::default(), MatchOrder::Number, 0, usize::MAX).await?;
         let verified =
             found.iter().filter(|numbered| MatchFilter::verified().accepts(&numbered.found)).count();
         let decided: Vec<bool> = found.iter().filter_map(|numbered| numbered.decision).collect();
@@ -316,7 +316,8 @@ impl Stage {
     async fn decide(&self, id: usize, word: &str) -> Result<String, AppError> {
         let site = self.site().await?;
         let map = site.map(None).await?;
-        let (verified, _) = matches(&map, &MatchFilter::verified(), 0, usize::MAX).await?;
+        let (verified, _) =
+            matches(&map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?;
         let found = &verified.get(id).ok_or_else(|| AppError::not_found("match", id))?.found;
         match word {
             "veto" => decide(&site, found, false).await?,

@@ -6,9 +6,9 @@ use locution_engine::config::EngineConfig;
 use rand::TryRng;
 use rand::rngs::SysRng;
 
-use super::site::Site;
+use super::site::{JobInfo, Site};
 use super::{App, AppError, Name};
-use crate::records::{Key, SiteRecord};
+use crate::records::{JobKind, Key, Retention, SiteRecord};
 use crate::storage::{Batch, Precondition};
 
 /// A site in a list.
@@ -75,6 +75,8 @@ impl App {
             next_job: 1,
             next_decision: 1,
             birth: new_birth()?,
+            num_deleted_runs: 0,
+            retention: Retention::default(),
         };
         let store = self.storage.open(name.as_str()).await?;
         let mut batch = Batch::default();
@@ -100,7 +102,10 @@ impl App {
             return Err(AppError::not_found("site", name));
         }
         let store = self.storage.open(name.as_str()).await?;
-        let site = Arc::new(Site::open(name, store, new_birth()?).await?);
+        let site =
+            Site::open(name, store, Arc::clone(&self.text_budget), self.stop.child_token(), new_birth()?)
+                .await?;
+        let site = Arc::new(site);
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
         self.work_on(&site);
         index_texts(&site);
@@ -143,15 +148,58 @@ impl App {
         Ok(sites)
     }
 
+    /// Changes how a site is mapped and asked, and how much of it is kept; answers the job that makes a map accordingly,
+    /// when something changed and there is a map.
+    ///
+    /// # Errors
+    /// [`AppError::Invalid`] for a configuration that cannot work, and for another translator: the texts of a site are
+    /// written by one.
+    pub async fn change_site(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        config: Option<EngineConfig>,
+        retention: Option<Retention>,
+    ) -> Result<Option<JobInfo>, AppError> {
+        let state = site.state();
+        if let Some(config) = &config {
+            config.validate()?;
+            if config.translator != state.config.translator {
+                let problem = "a site keeps the translator that its texts are written by; make another site for another";
+                return Err(AppError::invalid("config.translator", problem));
+            }
+        }
+        let config = config.filter(|config| *config != *state.config);
+        let retention = retention.filter(|retention| *retention != state.record.retention);
+        if config.is_none() && retention.is_none() {
+            return Ok(None);
+        }
+        let config_json = config.map(|config| serde_json::to_string(&config)).transpose();
+        let config_json = config_json.map_err(AppError::internal)?;
+        site.change(|record, _| {
+            record.config_json = config_json.unwrap_or_else(|| record.config_json.clone());
+            record.retention = retention.unwrap_or(record.retention);
+            Ok(())
+        })
+        .await?;
+        self.forget_served(site).await;
+        if state.record.map_version == 0 {
+            self.enforce_retention(site).await?;
+            return Ok(None);
+        }
+        Ok(Some(self.queue_job(site, JobKind::Build).await?))
+    }
+
     /// Forgets a site and everything in it.
     ///
     /// # Errors
     /// [`AppError::NotFound`].
     pub async fn delete_site(self: &Arc<Self>, name: &Name) -> Result<(), AppError> {
         let _queue = self.making_sites.lock().await;
-        // A site that cannot be opened can still be deleted.
-        if let Err(AppError::NotFound { kind, name }) = self.site(name).await {
-            return Err(AppError::NotFound { kind, name });
+        match self.site(name).await {
+            Ok(site) => site.stop.cancel(),
+            Err(AppError::NotFound { kind, name }) => return Err(AppError::NotFound { kind, name }),
+            // A site that cannot be opened can still be deleted.
+            Err(_) => {}
         }
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
         Ok(self.storage.delete(name.as_str()).await?)
@@ -163,6 +211,30 @@ mod tests {
     use super::*;
     use crate::config::ServerConfig;
     use crate::storage::{MemoryStorage, Storage};
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn indexes_that_nobody_asks_for_make_way_and_come_back() {
+        use crate::app::ask::find_words;
+        let storage: Arc<dyn Storage> = Arc::new(MemoryStorage::default());
+        let mut config = ServerConfig::default();
+        config.limits.text_index_bytes_max = 1;
+        config.builds.is_automatic = false;
+        let app = Arc::new(App::new(config, storage));
+        let mut sites = Vec::new();
+        for name in ["a", "b"] {
+            let (site, _) = app.make_site(&Name::new(name, "site").unwrap(), None).await.unwrap();
+            crate::app::faults::drive(&app, &site, &Name::new("r", "run").unwrap(), 240).await;
+            sites.push(site);
+        }
+        let pattern = [locution_engine::index::WordPattern::default()];
+        let ask = async |site: &Arc<Site>| format!("{:?}", find_words(site, &pattern, 9).await.unwrap());
+        let answer = ask(&sites[0]).await;
+        assert!(answer.contains("fit") && sites[0].num_index_bytes() > 0);
+        ask(&sites[1]).await;
+        assert_eq!(sites[0].num_index_bytes(), 0, "it made way for the other");
+        assert!(sites[1].num_index_bytes() > 0, "whoever was asked last stays");
+        assert_eq!(ask(&sites[0]).await, answer);
+    }
 
     #[tokio::test]
     async fn a_site_made_again_is_another_one_and_a_reopened_one_the_same() {

@@ -53,16 +53,11 @@ impl MapAt {
         Ok(self.state.app.picture(&self.site, &self.map, self.component, form).await?)
     }
 
-    /// The version's ETag. A site that was deleted and made again counts its versions anew, so the build is told apart
-    /// by when and of what it was made too.
+    /// The version's ETag. A site that was deleted and made again counts its versions anew, so the site's birth is in it.
+    /// What is drawn of a version is less after a run was deleted.
     fn tag(&self) -> String {
-        let mut build = crc32fast::Hasher::new();
-        build.update(&self.map.record.duration_s.to_le_bytes());
-        for run in &self.map.record.runs {
-            build.update(run.name.as_bytes());
-            build.update(&run.num_scans.to_le_bytes());
-        }
-        format!("\"{}-{:08x}\"", self.map.record.version, build.finalize())
+        let record = &self.site.state().record;
+        format!("\"{}-{:x}-{}\"", self.map.record.version, record.birth, record.num_deleted_runs)
     }
 
     /// A form of the map with its ETag; 304, and nothing is made, when the client has it.

@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
+use crate::app::{Area, Window};
 use crate::error::ApiError;
 use crate::http::wording::plain;
 
@@ -112,6 +113,34 @@ pub fn one_of<T: DeserializeOwned>(field: &str, word: Option<&str>) -> Result<Op
         .map_err(|error: serde::de::value::Error| ApiError::invalid(field, plain(&error.to_string())))
 }
 
+/// The part of what was driven that a list is about; `area` is `x,y,x,y` of two opposite corners, metres.
+///
+/// # Errors
+/// 422 for an area that is none, and for a time that ends before it begins.
+pub fn window(from_ns: Option<i64>, to_ns: Option<i64>, area: Option<&str>) -> Result<Window, ApiError> {
+    if let (Some(from_ns), Some(to_ns)) = (from_ns, to_ns)
+        && from_ns >= to_ns
+    {
+        return Err(ApiError::invalid("to_ns", "a window of time ends after it begins"));
+    }
+    Ok(Window { from_ns, to_ns, area: area.map(parse_area).transpose()? })
+}
+
+fn parse_area(text: &str) -> Result<Area, ApiError> {
+    let numbers: Vec<f64> = text.split(',').map_while(|number| number.trim().parse().ok()).collect();
+    match numbers[..] {
+        [x0, y0, x1, y1]
+            if numbers.len() == text.split(',').count() && numbers.iter().all(|x| x.is_finite()) =>
+        {
+            Ok(Area { low: Point2::new(x0.min(x1), y0.min(y1)), high: Point2::new(x0.max(x1), y0.max(y1)) })
+        }
+        _ => Err(ApiError::invalid(
+            "area",
+            "four numbers with commas between: x,y,x,y of two opposite corners, metres",
+        )),
+    }
+}
+
 /// Which part of a list to answer.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -171,5 +200,22 @@ impl<T> Page<T> {
     pub fn of(items: Vec<T>, first: u64, total: u64) -> Self {
         let next = first + items.len() as u64;
         Self { items, next_cursor: (next < total).then(|| next.to_string()) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_area_is_two_corners_in_any_order() {
+        let expected = Area { low: Point2::new(-1.0, 0.5), high: Point2::new(2.0, 3.0) };
+        for text in ["-1,0.5,2,3", "2, 3, -1, 0.5", "-1,3,2,0.5"] {
+            assert_eq!(window(None, None, Some(text)).unwrap().area, Some(expected), "{text}");
+        }
+        for text in ["", "1,2,3", "1,2,3,4,5", "1,2,3,x", "1,2,3,NaN", "1,2,inf,4"] {
+            assert!(window(None, None, Some(text)).is_err(), "{text}");
+        }
+        assert!(window(Some(5), Some(5), None).is_err());
     }
 }

@@ -21,6 +21,8 @@ pub enum PartKind {
     Labels = 2,
     /// Places of a component, in pieces.
     Places = 3,
+    /// Where and when the stretches of matches were driven, in the order of the matches.
+    MatchPlaces = 4,
 }
 
 /// Names a stored value of a site.
@@ -36,6 +38,8 @@ pub enum Key {
     RunHead(RunIdx),
     /// Up to 256 scans beginning with a sequence number.
     Scans(RunIdx, u64),
+    /// A run was deleted, and traces of it may be left.
+    DeletedRun(RunIdx),
     /// How far the text of a run has come.
     TextHead(Generation, RunIdx),
     /// The translator of a run, in parts of less than one mebibyte.
@@ -57,6 +61,8 @@ pub enum Key {
     /// A person's word on a pair of places.
     Decision(u64),
     Job(u64),
+    /// Registrations of a build that the end of the server interrupted, in parts of less than one mebibyte.
+    Registrations(u32),
 }
 
 impl Key {
@@ -68,6 +74,7 @@ impl Key {
             Key::Run(run) => Writer::new(0x03).u32(*run).done(),
             Key::RunHead(run) => Writer::new(0x04).u32(*run).done(),
             Key::Scans(run, first) => Writer::new(0x05).u32(*run).u64(*first).done(),
+            Key::DeletedRun(run) => Writer::new(0x06).u32(*run).done(),
             Key::TextHead(generation, run) => Writer::new(0x10).u32(*generation).u32(*run).done(),
             Key::Checkpoint(generation, run, part) => {
                 Writer::new(0x11).u32(*generation).u32(*run).u32(*part).done()
@@ -91,12 +98,28 @@ impl Key {
             Key::Match(version, number) => Writer::new(0x22).u64(*version).u64(*number).done(),
             Key::Decision(number) => Writer::new(0x30).u64(*number).done(),
             Key::Job(number) => Writer::new(0x31).u64(*number).done(),
+            Key::Registrations(part) => Writer::new(0x32).u32(*part).done(),
         }
     }
 
     /// The prefix of all scans of a run.
     pub fn all_scans(run: RunIdx) -> Vec<u8> {
         Writer::new(0x05).u32(run).done()
+    }
+
+    /// The prefix of all runs that were deleted and may have left traces.
+    pub fn all_deleted_runs() -> Vec<u8> {
+        vec![0x06]
+    }
+
+    /// The run that the key of a deleted one names.
+    pub fn deleted_run(key: &[u8]) -> Option<RunIdx> {
+        key.last_chunk().map(|bytes| u32::from_be_bytes(*bytes))
+    }
+
+    /// The prefixes of everything of a run that belongs to a text generation.
+    pub fn all_of_text(generation: Generation, run: RunIdx) -> Vec<Vec<u8>> {
+        (0x10..=0x15).map(|tag| Writer::new(tag).u32(generation).u32(run).done()).collect()
     }
 
     /// The prefix of all observations of a run.
@@ -169,6 +192,11 @@ impl Key {
         vec![0x31]
     }
 
+    /// The prefix of all registrations.
+    pub fn all_registrations() -> Vec<u8> {
+        vec![0x32]
+    }
+
     /// The big-endian number that closes a key, such as the first sequence number of a chunk.
     pub fn last_u64(key: &[u8]) -> Option<u64> {
         key.last_chunk().map(|bytes| u64::from_be_bytes(*bytes))
@@ -216,7 +244,12 @@ mod tests {
     use super::*;
 
     fn any_part() -> impl Strategy<Value = PartKind> {
-        prop_oneof![Just(PartKind::Poses), Just(PartKind::Labels), Just(PartKind::Places)]
+        prop_oneof![
+            Just(PartKind::Poses),
+            Just(PartKind::Labels),
+            Just(PartKind::Places),
+            Just(PartKind::MatchPlaces)
+        ]
     }
 
     fn any_key() -> impl Strategy<Value = Key> {
@@ -226,6 +259,7 @@ mod tests {
             any::<u32>().prop_map(Key::Run),
             any::<u32>().prop_map(Key::RunHead),
             any::<(u32, u64)>().prop_map(|(run, first)| Key::Scans(run, first)),
+            any::<u32>().prop_map(Key::DeletedRun),
             any::<(u32, u32)>().prop_map(|(generation, run)| Key::TextHead(generation, run)),
             any::<(u32, u32, u32)>().prop_map(|(g, run, part)| Key::Checkpoint(g, run, part)),
             any::<(u32, u32, u64)>().prop_map(|(g, run, first)| Key::Observations(g, run, first)),
@@ -236,6 +270,7 @@ mod tests {
             any::<(u64, u64)>().prop_map(|(v, number)| Key::Match(v, number)),
             any::<u64>().prop_map(Key::Decision),
             any::<u64>().prop_map(Key::Job),
+            any::<u32>().prop_map(Key::Registrations),
         ]
     }
 
@@ -254,6 +289,7 @@ mod tests {
         assert!(Key::places(1, 2, 3).encode().starts_with(&Key::all_places(1, 2)));
         assert!(!Key::places(1, 3, 3).encode().starts_with(&Key::all_places(1, 2)));
         assert_eq!(Key::run_of_packed_text(&Key::PackedText(1, 7, 2).encode()), Some(7));
+        assert_eq!(Key::deleted_run(&Key::DeletedRun(7).encode()), Some(7));
         assert_eq!(Key::last_u64(&Key::Scans(7, 9).encode()), Some(9));
     }
 }

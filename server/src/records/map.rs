@@ -14,7 +14,7 @@ use super::reader::SiteReader;
 use super::run::Run;
 use super::series;
 use super::stored::StoredKeyframe;
-use super::stored_map::{MapPose, MapRecord, MapRun, StoredLabel};
+use super::stored_map::{MapPose, MapRecord, MapRun, MatchPlace, StoredLabel};
 use crate::storage::{Batch, StorageError};
 
 /// A map version, with the texts of the generation that serves.
@@ -69,6 +69,17 @@ impl Map {
     /// [`StorageError::Corrupt`] when one of them is missing.
     pub async fn labels(&self, run: &MapRun) -> Result<Vec<StoredLabel>, StorageError> {
         self.part(PartKind::Labels, run.first_label..run.first_label + run.num_labels).await
+    }
+
+    /// Where and when the stretches of all matches were driven; nothing in versions that do not say.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`] when one of them is missing.
+    pub async fn match_places(&self) -> Result<Vec<Option<MatchPlace>>, StorageError> {
+        match self.record.has_match_places {
+            true => self.part(PartKind::MatchPlaces, 0..self.record.num_matches).await,
+            false => Ok(Vec::new()),
+        }
     }
 
     async fn part<T: serde::de::DeserializeOwned>(

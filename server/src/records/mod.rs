@@ -35,6 +35,7 @@ pub use reader::SiteReader;
 pub use run::Run;
 pub use scans::{append_scans, find_receipt, is_same_scan, read_scans};
 pub use stored::{
-    JobKind, JobRecord, JobState, Receipt, RunHead, RunRecord, SiteRecord, StoredKeyframe, TextHead,
+    JobKind, JobRecord, JobState, Receipt, Retention, RunHead, RunRecord, SiteRecord, StoredKeyframe,
+    TextHead,
 };
-pub use stored_map::{MapPose, MapRecord, MapRun, StoredLabel};
+pub use stored_map::{Digest, MapPose, MapRecord, MapRun, MatchPlace, StoredLabel, StretchPlace};

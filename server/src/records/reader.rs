@@ -9,6 +9,7 @@ use super::codec;
 use super::keys::{Generation, Key, MapVersion, RunIdx};
 use super::map::Map;
 use super::run::Run;
+use super::stored_map::MapRecord;
 use crate::storage::{Reader, StorageError};
 
 /// Reads a site's runs and maps, either as they stand or as they stood at a snapshot.
@@ -54,7 +55,8 @@ impl SiteReader {
 
     /// A map version; `None` when it is not kept.
     pub async fn map(&self, version: MapVersion) -> Result<Option<Map>, StorageError> {
-        let record = get(self.store(), &Key::Map(version), "a map version").await?;
+        let stored = self.store.get(&Key::Map(version).encode()).await?;
+        let record = stored.map(|bytes| MapRecord::decode(&bytes)).transpose()?;
         Ok(record.map(|record| Map::new(record, self.clone())))
     }
 

@@ -9,15 +9,15 @@ use super::codec;
 use super::keys::{Generation, MapVersion, RunIdx};
 use crate::storage::StorageError;
 
-/// The layout of [`SiteRecord`]; 1 had no birth.
-const SITE_LAYOUT: u8 = 2;
+/// The layout of [`SiteRecord`]; 1 had no birth, 2 nothing of deleted runs and retention.
+const SITE_LAYOUT: u8 = 3;
 
 /// `Key::Site`: what the site is and what of it serves.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SiteRecord {
     /// The engine's configuration, as JSON so that a later version with more fields can still read it.
     pub config_json: String,
-    /// Number of runs, and the index of the next one.
+    /// Number of runs, deleted ones among them, and the index of the next one.
     pub num_runs: RunIdx,
     /// The text generation that serves.
     pub generation: Generation,
@@ -32,6 +32,34 @@ pub struct SiteRecord {
     /// Drawn at random when the site was made: a site that is deleted and made again under the same name is another
     /// one, and nothing that was kept of the first may be served for the second.
     pub birth: u64,
+    /// Number of runs that were deleted.
+    pub num_deleted_runs: u32,
+    /// How much of it is kept.
+    pub retention: Retention,
+}
+
+/// How much of a site is kept; what is not said is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Retention {
+    /// Map versions, the serving one included; as the server is configured unless said.
+    pub num_versions: Option<u32>,
+    /// Runs: finished ones beyond are deleted, the oldest first.
+    pub num_runs: Option<u32>,
+    /// Scans of all runs together: finished runs are deleted, the oldest first, until no more are left.
+    pub num_scans: Option<u64>,
+}
+
+/// [`SiteRecord`] as sites stored it before runs could be deleted.
+#[derive(Serialize, Deserialize)]
+struct SiteRecord2 {
+    config_json: String,
+    num_runs: RunIdx,
+    generation: Generation,
+    quantizer_json: Option<String>,
+    map_version: MapVersion,
+    next_job: u64,
+    next_decision: u64,
+    birth: u64,
 }
 
 /// [`SiteRecord`] as sites stored it before they had a birth.
@@ -46,6 +74,21 @@ struct SiteRecord1 {
     next_decision: u64,
 }
 
+impl SiteRecord2 {
+    fn of_first(old: SiteRecord1, birth: u64) -> Self {
+        Self {
+            config_json: old.config_json,
+            num_runs: old.num_runs,
+            generation: old.generation,
+            quantizer_json: old.quantizer_json,
+            map_version: old.map_version,
+            next_job: old.next_job,
+            next_decision: old.next_decision,
+            birth,
+        }
+    }
+}
+
 impl SiteRecord {
     /// The stored form.
     pub fn encode(&self) -> Bytes {
@@ -58,10 +101,11 @@ impl SiteRecord {
     /// [`StorageError::Corrupt`].
     pub fn decode(bytes: &[u8], birth_if_none: u64) -> Result<Self, StorageError> {
         let what = "the record of the site";
-        if codec::version_of(bytes) != Some(1) {
-            return codec::decode_as(SITE_LAYOUT, bytes, what);
-        }
-        let old: SiteRecord1 = codec::decode_as(1, bytes, what)?;
+        let old = match codec::version_of(bytes) {
+            Some(1) => SiteRecord2::of_first(codec::decode_as(1, bytes, what)?, birth_if_none),
+            Some(2) => codec::decode_as(2, bytes, what)?,
+            _ => return codec::decode_as(SITE_LAYOUT, bytes, what),
+        };
         Ok(Self {
             config_json: old.config_json,
             num_runs: old.num_runs,
@@ -70,11 +114,13 @@ impl SiteRecord {
             map_version: old.map_version,
             next_job: old.next_job,
             next_decision: old.next_decision,
-            birth: birth_if_none,
+            birth: old.birth,
+            num_deleted_runs: 0,
+            retention: Retention::default(),
         })
     }
 
-    /// Whether a stored form is of an older layout and should be written again.
+    /// Whether a stored form has no birth and should be written again, so that the one just given stays.
     pub fn is_outdated(bytes: &[u8]) -> bool {
         codec::version_of(bytes) == Some(1)
     }
@@ -88,6 +134,25 @@ pub struct RunRecord {
     /// The robot, when the client said.
     pub robot: Option<String>,
     pub geometry: ScanGeometry,
+}
+
+impl RunRecord {
+    /// What stands in the place of a run that was deleted: numbers of runs are never used again. No run has such a name.
+    pub fn deleted() -> Self {
+        let geometry = ScanGeometry {
+            num_ranges: 1,
+            angle_min_rad: 0.0,
+            angle_increment_rad: 0.0,
+            range_max_m: 1.0,
+            robot_from_laser: Pose2::identity(),
+        };
+        Self { name: String::new(), robot: None, geometry }
+    }
+
+    /// Whether the run was deleted.
+    pub fn is_deleted(&self) -> bool {
+        self.name.is_empty()
+    }
 }
 
 /// `Key::RunHead`: how far the recording has come.
@@ -175,6 +240,8 @@ pub enum JobState {
     /// It did what it should.
     Done,
     Failed,
+    /// Somebody ended it before it was done.
+    Cancelled,
 }
 
 /// `Key::Job`: a job.
@@ -214,5 +281,22 @@ mod tests {
         let again = record.encode();
         assert!(!SiteRecord::is_outdated(&again));
         assert_eq!(SiteRecord::decode(&again, 43).unwrap(), record);
+    }
+
+    #[test]
+    fn a_site_from_before_runs_could_be_deleted_is_read() {
+        let old = SiteRecord2 {
+            config_json: "{}".into(),
+            num_runs: 3,
+            generation: 1,
+            quantizer_json: None,
+            map_version: 2,
+            next_job: 5,
+            next_decision: 7,
+            birth: 9,
+        };
+        let record = SiteRecord::decode(&codec::encode_as(2, &old), 42).unwrap();
+        assert_eq!((record.num_runs, record.birth, record.num_deleted_runs), (3, 9, 0));
+        assert_eq!(record.retention, Retention::default());
     }
 }

@@ -14,6 +14,8 @@ pub enum JobState {
     Done,
     /// It did not; `error` says why.
     Failed,
+    /// Somebody ended it before it was done.
+    Cancelled,
 }
 
 /// What a job does.
@@ -35,6 +37,8 @@ pub struct Job {
     pub state: JobState,
     /// From 0 to 1.
     pub progress: f64,
+    /// Seconds that it will still take, while that can be told.
+    pub left_s: Option<f64>,
     /// What it is at, or what came of it.
     pub detail: String,
     /// Why it failed.

@@ -46,6 +46,8 @@ pub struct Localization {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<Hypothesis>,
+    /// Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+    pub expires_in_s: f64,
     /// Probability that the robot is not in this map; with those of all places 1.
     pub probability_elsewhere: f64,
     /// What is missing to be found; empty when it is.

@@ -229,6 +229,8 @@ pub struct LabelQuery {
 /// Where a question fits.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabelAnswer {
+    /// The site.
+    pub site: String,
     /// The stretches, in the order of the question.
     pub places: Vec<Label>,
     /// Whether the run drove them the other way round.

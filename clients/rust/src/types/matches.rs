@@ -79,6 +79,14 @@ pub struct Interval {
     pub first: u32,
     /// Last observation, inclusive.
     pub last: u32,
+    /// Timestamp of the first, nanoseconds; `None` in map versions of earlier programs, as what follows.
+    pub first_timestamp_ns: Option<i64>,
+    /// Timestamp of the last, nanoseconds.
+    pub last_timestamp_ns: Option<i64>,
+    /// Component of the map.
+    pub component: Option<u32>,
+    /// Where it was half way, in the component's frame.
+    pub map_from_middle: Option<Pose>,
 }
 
 /// What a person said of a pair of places.
@@ -89,6 +97,16 @@ pub enum DecisionKind {
     Veto,
     /// It is the same place, whatever the evidence.
     Confirm,
+}
+
+impl DecisionKind {
+    /// Its name in the API.
+    pub fn as_str(self) -> &'static str {
+        match self {
+            Self::Veto => "veto",
+            Self::Confirm => "confirm",
+        }
+    }
 }
 
 /// How one submap lies on the other.

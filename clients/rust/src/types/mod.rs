@@ -2,6 +2,7 @@
 //!
 //! Answers may gain members in later versions of the server; what is not known here is passed over.
 
+mod events;
 mod jobs;
 mod localizations;
 mod maps;
@@ -11,6 +12,7 @@ mod sites;
 mod texts;
 mod values;
 
+pub use events::{Event, RunChange};
 pub use jobs::{Job, JobKind, JobState};
 pub use localizations::{
     ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState, Missing,
@@ -25,7 +27,7 @@ pub use matches::{
     Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,
 };
 pub use runs::{Geometry, NewRun, Receipt, Run, RunState, Scan, StoredScan};
-pub use sites::{Site, SiteState, SiteSummary};
+pub use sites::{ChangedSite, Retention, Site, SiteChange, SiteState, SiteSummary};
 pub use texts::{
     Frame, Observation, StampedPose, Trajectory, Word, WordAnswer, WordId, WordPattern, WordQuery,
 };

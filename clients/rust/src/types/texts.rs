@@ -97,8 +97,10 @@ pub struct StampedPose {
 pub struct Trajectory {
     /// Component of the map that the poses belong to; null outside the map frame.
     pub component: Option<u32>,
-    /// One for every scan, in order.
+    /// One for every scan that was asked for, in order.
     pub poses: Vec<StampedPose>,
+    /// Where the next ones begin, when fewer were wanted than there are.
+    pub next_cursor: Option<String>,
 }
 
 /// One word of a question; what is left out may be anything.

@@ -16,7 +16,7 @@ use lru::LruCache;
 
 use crate::app::runs::NewBatch;
 use crate::app::site::Site;
-use crate::app::{App, AppError, on_blocking_thread};
+use crate::app::{App, AppError, forget_where, on_blocking_thread};
 use crate::records::{Map, MapRun};
 
 /// Memory for prepared maps of all sites; the one asked about last is kept whatever it takes.
@@ -24,8 +24,8 @@ const NUM_BYTES_KEPT_MAX: usize = 512 << 20;
 /// Keyframes read and drawn at once.
 const NUM_KEYFRAMES_PER_STEP: usize = 500;
 
-/// Site and map version.
-type IndexKey = (String, u64);
+/// Birth of the site and map version.
+type IndexKey = (u64, u64);
 
 /// Prepared maps, the latest used first.
 pub struct PlaceIndexes {
@@ -45,15 +45,16 @@ impl PlaceIndexes {
         self.kept.lock().unwrap_or_else(PoisonError::into_inner).get(key).cloned()
     }
 
+    /// Forgets the maps of a site, by its birth.
+    pub(in crate::app) fn forget(&self, birth: u64) {
+        forget_where(&mut self.kept.lock().unwrap_or_else(PoisonError::into_inner), |key| key.0 == birth);
+    }
+
     /// Keeps an index instead of older ones of its site, and lets go of the least used ones when they take too much.
     fn put(&self, key: IndexKey, index: Arc<PlaceIndex>) {
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let is_stale = |known: &IndexKey| known.0 == key.0 && known.1 < key.1;
-        let stale: Vec<IndexKey> =
-            kept.iter().map(|(known, _)| known).filter(|known| is_stale(known)).cloned().collect();
-        for known in stale {
-            kept.pop(&known);
-        }
+        forget_where(&mut kept, is_stale);
         kept.put(key, index);
         let num_bytes = |kept: &LruCache<IndexKey, Arc<PlaceIndex>>| {
             kept.iter().map(|(_, index)| index.num_bytes()).sum::<usize>()
@@ -137,7 +138,7 @@ impl App {
         site: &Site,
         map: &Map,
     ) -> Result<Arc<PlaceIndex>, AppError> {
-        let key = (site.name().to_string(), map.record.version);
+        let key = (site.birth(), map.record.version);
         if let Some(index) = self.place_indexes.get(&key) {
             return Ok(index);
         }

@@ -8,13 +8,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::geometry::Pose2;
-use locution_engine::locate::{LocalizationEstimate, PosePrior, ServedMap, SessionMap, SiteSession};
+use locution_engine::locate::{
+    LocalizationEstimate, LocalizationState, PosePrior, ServedMap, SessionMap, SiteSession,
+};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::translator::Translator;
 
 use super::examples::invalid_geometry;
 use crate::app::runs::NewBatch;
-use crate::app::site::Site;
+use crate::app::site::{Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
 use crate::records::Map;
 
@@ -34,6 +36,8 @@ pub struct LocalizationInfo {
     pub next_sequence: u64,
     /// What it says.
     pub estimate: LocalizationEstimate,
+    /// It is forgotten when it gets no scans for so long.
+    pub expires_in: Duration,
 }
 
 /// The sessions of this process.
@@ -49,10 +53,14 @@ struct SessionTable {
 }
 
 struct Session {
-    site: String,
+    /// Birth of the site.
+    site: u64,
+    owner: Arc<str>,
     geometry: ScanGeometry,
     map_version: u64,
     latest_use: Mutex<Instant>,
+    /// The state that those who watch were told.
+    told: Mutex<Option<LocalizationState>>,
     search: tokio::sync::Mutex<Search>,
 }
 
@@ -73,7 +81,7 @@ impl Search {
 }
 
 impl App {
-    /// Opens a session in the serving map; a rough pose may be declared.
+    /// Opens a session in the serving map, for an owner who may have a limit of his own; a rough pose may be declared.
     ///
     /// # Errors
     /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
@@ -83,18 +91,23 @@ impl App {
         site: &Site,
         geometry: ScanGeometry,
         prior: Option<PosePrior>,
+        owner: Arc<str>,
+        num_own_max: Option<usize>,
     ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
         let search = self.new_search(site, &map, &geometry, prior).await?;
         let session = Session {
-            site: site.name().to_string(),
+            site: site.birth(),
+            owner,
             geometry,
             map_version: map.record.version,
             latest_use: Mutex::new(Instant::now()),
+            told: Mutex::new(None),
             search: tokio::sync::Mutex::new(search),
         };
-        let id = self.localizations.insert(session, self.config().limits.num_localizations_max)?;
+        let id =
+            self.localizations.insert(session, self.config().limits.num_localizations_max, num_own_max)?;
         self.localization(site, id).await
     }
 
@@ -103,13 +116,25 @@ impl App {
     /// # Errors
     /// [`AppError::NotFound`].
     pub async fn localization(&self, site: &Site, id: u64) -> Result<LocalizationInfo, AppError> {
-        let session = self.session(site, id)?;
-        let search = session.search.lock().await;
-        let estimating = search.clone();
-        let next_sequence = search.next_sequence;
-        drop(search);
-        let estimate = on_blocking_thread(move || estimating.session.estimate()).await?;
-        Ok(LocalizationInfo { id, map_version: session.map_version, next_sequence, estimate })
+        info(id, &*self.session(site, id)?).await
+    }
+
+    /// The answers of all sessions in a site, the oldest first; looking at them keeps none of them open.
+    ///
+    /// # Errors
+    /// [`AppError::Internal`].
+    pub async fn localizations(&self, site: &Site) -> Result<Vec<LocalizationInfo>, AppError> {
+        let of_site = |session: &Session| session.site == site.birth() && session.idle_for() < IDLE_MAX;
+        let sessions: Vec<(u64, Arc<Session>)> = {
+            let table = self.localizations.table();
+            let sessions = table.sessions.iter().filter(|(_, session)| of_site(session));
+            sessions.map(|(id, session)| (*id, Arc::clone(session))).collect()
+        };
+        let mut infos = Vec::new();
+        for (id, session) in sessions {
+            infos.push(info(id, &session).await?);
+        }
+        Ok(infos)
     }
 
     /// Feeds a session. Scans it has seen are passed over; a gap is refused.
@@ -139,7 +164,14 @@ impl App {
         })
         .await?;
         drop(search);
-        self.localization(site, id).await
+        let info = info(id, &session).await?;
+        let mut told = session.told.lock().unwrap_or_else(PoisonError::into_inner);
+        let state = info.estimate.state;
+        if told.replace(state) != Some(state) {
+            site.events().tell(SiteEvent::Localization { id, state });
+        }
+        drop(told);
+        Ok(info)
     }
 
     /// Closes a session.
@@ -154,7 +186,7 @@ impl App {
 
     fn session(&self, site: &Site, id: u64) -> Result<Arc<Session>, AppError> {
         let table = self.localizations.table();
-        let session = table.sessions.get(&id).filter(|session| session.site == site.name().as_str());
+        let session = table.sessions.get(&id).filter(|session| session.site == site.birth());
         let session = session.ok_or_else(|| AppError::not_found("localisation", id))?;
         *session.latest_use.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         Ok(Arc::clone(session))
@@ -192,7 +224,7 @@ impl App {
 
     /// A component with the fields that localisation looks things up in.
     async fn served_map(&self, site: &Site, map: &Map, component: u32) -> Result<Arc<ServedMap>, AppError> {
-        let key = (site.name().to_string(), map.record.version, component);
+        let key = (site.birth(), map.record.version, component);
         let mut served_maps = self.served_maps.lock().await;
         if let Some(served) = served_maps.get(&key) {
             return Ok(Arc::clone(served));
@@ -209,12 +241,29 @@ impl App {
     }
 }
 
+/// The answer of a session as it stands.
+async fn info(id: u64, session: &Session) -> Result<LocalizationInfo, AppError> {
+    let search = session.search.lock().await;
+    let estimating = search.clone();
+    let next_sequence = search.next_sequence;
+    drop(search);
+    let estimate = on_blocking_thread(move || estimating.session.estimate()).await?;
+    Ok(LocalizationInfo {
+        id,
+        map_version: session.map_version,
+        next_sequence,
+        estimate,
+        expires_in: IDLE_MAX.saturating_sub(session.idle_for()),
+    })
+}
+
 impl Localizations {
     /// Keeps a session when there is room after the idle ones went.
-    fn insert(&self, session: Session, num_max: usize) -> Result<u64, AppError> {
+    fn insert(&self, session: Session, num_max: usize, num_own_max: Option<usize>) -> Result<u64, AppError> {
         let mut table = self.table();
         table.sessions.retain(|_, session| session.idle_for() < IDLE_MAX);
-        if table.sessions.len() >= num_max {
+        let num_own = table.sessions.values().filter(|other| other.owner == session.owner).count();
+        if table.sessions.len() >= num_max || num_own_max.is_some_and(|num_own_max| num_own >= num_own_max) {
             let queue = "the table of localisations";
             return Err(AppError::Busy { queue, retry_after: Duration::from_secs(10) });
         }
@@ -222,6 +271,11 @@ impl Localizations {
         let id = table.next_id;
         table.sessions.insert(id, Arc::new(session));
         Ok(id)
+    }
+
+    /// Sessions that are open.
+    pub(in crate::app) fn num_sessions(&self) -> usize {
+        self.table().sessions.len()
     }
 
     fn table(&self) -> std::sync::MutexGuard<'_, SessionTable> {

@@ -44,13 +44,18 @@ pub async fn find_words(
     };
     let mut answers = Vec::with_capacity(found.len());
     for (run, found) in found {
+        let record = reader.run(run).await?.record;
+        // Deleted since the question was put.
+        if record.is_deleted() {
+            continue;
+        }
         let (first, last) = (found.stretch.first, found.stretch.last);
         let in_map = match &map {
             Some(map) => place(map, run, u64::from(first + (last - first) / 2)).await?,
             None => None,
         };
         answers.push(WordAnswer {
-            run: reader.run(run).await?.record.name.clone(),
+            run: record.name.clone(),
             direction: found.direction,
             words: found.words,
             observations: (first, last),

@@ -1,24 +1,29 @@
 //! Building the map of a site in the background: load a snapshot, let the engine map it, write a version, serve it.
 
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use locution_engine::config::EngineConfig;
+use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{
-    Channel, Decision, Evidence, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason, RunRecord,
-    SiteMap, map_site, weigh_texts,
+    Channel, Decision, Evidence, Interval, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
+    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, place_observations,
+    weigh_texts,
 };
 use locution_engine::semantics::MapLabels;
 use locution_engine::text::{Observation, Word};
+use sha2::{Digest as _, Sha256};
 
-use crate::app::maps::{WrittenRun, serve_map, write_map};
-use crate::app::site::{Progress, Site};
+use crate::app::maps::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};
+use crate::app::runs::{end_deletions, pending_deletions};
+use crate::app::site::{BuildStage, Progress, Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
-use crate::records::{JobKind, Run};
-
-/// Remembered registrations beyond this are forgotten, so that memory stays bounded.
-const NUM_REMEMBERED_MAX: usize = 500_000;
+use crate::records::{
+    Digest, JobKind, Map, MapRecord, MatchPlace, Run, RunIdx, SiteRecord, StretchPlace, codec,
+};
 
 /// A run with everything the map builder reads.
 struct LoadedRun {
@@ -51,31 +56,54 @@ impl App {
     pub(in crate::app) async fn build(
         self: &Arc<Self>,
         site: &Arc<Site>,
-        progress: &Progress,
+        progress: &Arc<Progress>,
     ) -> Result<String, AppError> {
         let started = Instant::now();
+        self.enforce_retention(site).await?;
+        let deleted = pending_deletions(site).await?;
         self.renew_texts(site, progress).await?;
-        progress.at(0.0, "reading the runs");
+        progress.at(BuildStage::Reading, 0.0)?;
         let state = site.state();
         let snapshot = site.snapshot().await?;
         let mut runs = Vec::new();
         for run in 0..state.record.num_runs {
-            runs.push(LoadedRun::load(snapshot.run(run).await?).await?);
-            progress.at(0.1 * f64::from(run + 1) / f64::from(state.record.num_runs), "reading the runs");
+            runs.push(snapshot.run(run).await?);
+        }
+        let decisions: Vec<Decision> =
+            snapshot.decisions().await?.into_iter().map(|(_, decision)| decision).collect();
+        let made_of = digest_of(&state.record, &runs, &decisions);
+        let serving = match site.map(None).await {
+            Err(AppError::NotReady { .. }) => None,
+            map => Some(map?),
+        };
+        if let Some(map) = serving.as_ref().filter(|map| map.record.made_of == made_of) {
+            return self.stands(site, map, &deleted, progress).await;
+        }
+        let num_runs = runs.len();
+        let mut loaded = Vec::new();
+        for run in runs {
+            loaded.push(LoadedRun::load(run).await?);
+            progress.at(BuildStage::Reading, loaded.len() as f64 / num_runs as f64)?;
         }
         drop(snapshot);
-        progress.at(0.1, "matching places and optimising the graph");
-        let decisions = site.reader().decisions().await?.into_iter().map(|(_, decision)| decision).collect();
-        let written: Vec<WrittenRun> = runs.iter().map(written_run).collect();
-        let (map, labels) = map_runs(site, Arc::clone(&state.config), runs, decisions).await?;
-        progress.at(0.9, "writing the map");
-        let duration_s = started.elapsed().as_secs_f64();
-        let map = write_map(site, &map, &labels, &written, duration_s).await?;
-        serve_map(site, map.record.version, self.config().builds.num_versions_kept).await?;
-        // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
-        progress.at(0.95, "preparing questions by example");
-        self.place_index(site, &map).await?;
+        let written: Vec<WrittenRun> = loaded.iter().map(written_run).collect();
+        let MadeMap { map, labels, match_places } =
+            map_runs(site, Arc::clone(&state.config), loaded, decisions, progress).await?;
+        progress.at(BuildStage::Writing, 0.0)?;
+        let draft = MapDraft::new(site, &map, &labels, &match_places, &written, made_of)?;
+        drop((map, labels, match_places));
+        if let Some(map) = serving.as_ref().filter(|map| draft.is_same_as(&map.record)) {
+            note_made_of(site, &map.record, made_of).await?;
+            return self.stands(site, map, &deleted, progress).await;
+        }
+        let map = draft.write(site, started.elapsed().as_secs_f64()).await?;
+        serve_map(site, map.record.version).await?;
+        tell_of(site, &map);
+        self.tidy_up(site, &map, &deleted, progress).await?;
         let record = &map.record;
+        let num_before = serving.map_or(0, |serving| serving.record.num_verified);
+        metrics::counter!("locution_closures_total")
+            .increment(record.num_verified.saturating_sub(num_before));
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
         Ok(format!(
             "map version {}: {} runs in {} components, {} of {} matches verified, {:.1} s",
@@ -86,6 +114,37 @@ impl App {
             record.num_matches,
             record.duration_s
         ))
+    }
+
+    /// Ends a build that changes nothing: the version that serves goes on to serve, and pushes no older one out.
+    async fn stands(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        map: &Map,
+        deleted: &[RunIdx],
+        progress: &Progress,
+    ) -> Result<String, AppError> {
+        self.tidy_up(site, map, deleted, progress).await?;
+        Ok(format!("map version {} stands: nothing has changed", map.record.version))
+    }
+
+    /// What follows once a version serves: whatever need not be kept goes, and questions by example are prepared.
+    async fn tidy_up(
+        self: &Arc<Self>,
+        site: &Arc<Site>,
+        map: &Map,
+        deleted: &[RunIdx],
+        progress: &Progress,
+    ) -> Result<(), AppError> {
+        let retention = site.state().record.retention;
+        let num_kept =
+            retention.num_versions.map_or(self.config().builds.num_versions_kept, |num| num as usize);
+        drop_versions(site, num_kept).await?;
+        end_deletions(site, deleted).await?;
+        // In the job, which is in the background already: nothing must hold the storage after the server has stopped.
+        progress.tell(BuildStage::Preparing, 0.0);
+        self.place_index(site, map).await?;
+        Ok(())
     }
 
     /// Builds after some quiet, so that runs which finish together share one build.
@@ -106,12 +165,38 @@ impl App {
     }
 }
 
+/// Tells those who watch of a version that begins to serve.
+fn tell_of(site: &Site, map: &Map) {
+    let MapRecord { version, num_components, num_matches, num_verified, .. } = map.record;
+    site.events().tell(SiteEvent::Version { version, num_components });
+    site.events().tell(SiteEvent::Matches { version, num_matches, num_verified });
+}
+
 fn written_run(run: &LoadedRun) -> WrittenRun {
     WrittenRun {
         run: run.run.idx,
         name: run.run.record.name.clone(),
         num_scans: run.run.head.next_sequence,
         keyframe_seqs: run.keyframes.iter().map(|keyframe| keyframe.scan_seq).collect(),
+    }
+}
+
+/// Numbers components anew, those of runs that drove first: component 0 is what is shown unless another is asked for, and
+/// must not be that of a run that has sent nothing or was deleted.
+fn number_driven_first(runs: &[RunRecord<'_>], map: &mut SiteMap) {
+    let mut numbers = BTreeMap::new();
+    for is_driven in [true, false] {
+        for (_, mapped) in runs.iter().zip(&map.runs).filter(|(run, _)| run.keyframes.is_empty() != is_driven)
+        {
+            let next = numbers.len() as u32;
+            numbers.entry(mapped.component).or_insert(next);
+        }
+        if is_driven {
+            map.num_components = numbers.len() as u32;
+        }
+    }
+    for mapped in &mut map.runs {
+        mapped.component = numbers[&mapped.component];
     }
 }
 
@@ -133,34 +218,91 @@ fn keep_vetoed_visible(map: &mut SiteMap, decisions: &[Decision]) {
     }
 }
 
+/// What the engine makes of runs.
+struct MadeMap {
+    map: SiteMap,
+    labels: MapLabels,
+    match_places: Vec<Option<MatchPlace>>,
+}
+
+/// Where and when the stretches of all matches were driven.
+fn match_places(runs: &[RunRecord<'_>], map: &SiteMap) -> Vec<Option<MatchPlace>> {
+    let poses: Vec<Vec<Pose2>> =
+        runs.iter().zip(&map.runs).map(|(run, mapped)| place_observations(run, mapped)).collect();
+    let place = |stretch: &Interval| {
+        let run_idx = stretch.run_idx as usize;
+        let observations = runs.get(run_idx)?.observations;
+        let time_ns = |observation: u32| Some(observations.get(observation as usize)?.timestamp_ns);
+        let middle = stretch.first + stretch.last.saturating_sub(stretch.first) / 2;
+        Some(StretchPlace {
+            timestamps_ns: (time_ns(stretch.first)?, time_ns(stretch.last)?),
+            component: map.runs.get(run_idx)?.component,
+            map_from_middle: *poses.get(run_idx)?.get(middle as usize)?,
+        })
+    };
+    let of_match = |found: &PlaceMatch| {
+        Some(MatchPlace { earlier: place(&found.earlier)?, later: place(&found.later)? })
+    };
+    map.matches.iter().map(of_match).collect()
+}
+
+/// The digest of everything that a map is made of, the program included.
+fn digest_of(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest {
+    let mut hasher = Sha256::new();
+    hasher.update(env!("CARGO_PKG_VERSION"));
+    hasher.update(codec::encode(&(&site.config_json, site.generation)));
+    for run in runs {
+        hasher.update(codec::encode(&(run.idx, &run.record.name, &run.head, &run.text.num_words)));
+        hasher.update(codec::encode(&(run.text.num_observations, run.text.num_keyframes)));
+    }
+    decisions.iter().for_each(|decision| hasher.update(codec::encode(decision)));
+    hasher.finalize().into()
+}
+
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
-) -> Result<(SiteMap, MapLabels), AppError> {
+    progress: &Arc<Progress>,
+) -> Result<MadeMap, AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
         let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
-        return Ok((map, labels));
+        return Ok(MadeMap { map, labels, match_places: Vec::new() });
     }
-    let mut memo = std::mem::take(&mut *site.memo.lock().unwrap_or_else(PoisonError::into_inner));
-    let (memo, outcome) = on_blocking_thread(move || {
+    let mut memo = site.registrations.take(site.store()).await?;
+    let (progress, site) = (Arc::clone(progress), Arc::clone(site));
+    on_blocking_thread(move || {
+        let told = |step: MapStep| {
+            let stage = match step.stage {
+                MapStage::Settling => BuildStage::Settling,
+                MapStage::Joining => BuildStage::Joining,
+            };
+            match progress.at(stage, step.share) {
+                Ok(()) => ControlFlow::Continue(()),
+                Err(_) => ControlFlow::Break(()),
+            }
+        };
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site(&config.mapping, &records, &decisions, &mut memo).map(|mut map| {
-            weigh_texts(&records, &mut map, &config.matching);
-            map.matches.append(&mut map.refused);
-            keep_vetoed_visible(&mut map, &decisions);
-            let labels = MapLabels::of(&records, &map, &config.semantics);
-            (map, labels)
-        });
-        (memo, outcome)
+        let outcome = map_site_watched(&config.mapping, &records, &decisions, &mut memo, Watch::new(&told));
+        // Also when the job was given up meanwhile: whoever goes on takes it up.
+        site.registrations.give_back(memo);
+        let mut map = outcome.map_err(|error| match error {
+            MappingError::Stopped => AppError::Stopping,
+            MappingError::Graph(error) => AppError::internal(error),
+        })?;
+        progress.at(BuildStage::Weighing, 0.0)?;
+        number_driven_first(&records, &mut map);
+        weigh_texts(&records, &mut map, &config.matching);
+        map.matches.append(&mut map.refused);
+        keep_vetoed_visible(&mut map, &decisions);
+        progress.at(BuildStage::Weighing, 0.5)?;
+        let labels = MapLabels::of(&records, &map, &config.semantics);
+        let match_places = match_places(&records, &map);
+        Ok(MadeMap { map, labels, match_places })
     })
-    .await?;
-    if memo.len() <= NUM_REMEMBERED_MAX {
-        *site.memo.lock().unwrap_or_else(PoisonError::into_inner) = memo;
-    }
-    outcome.map_err(AppError::internal)
+    .await?
 }

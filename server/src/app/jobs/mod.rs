@@ -2,4 +2,7 @@
 
 mod build;
 mod regenerate;
+mod turns;
 mod worker;
+
+pub use turns::Turns;

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 use locution_engine::text::{DensityHistogram, Quantizer, QuantizerConfig};
 
-use crate::app::site::{Progress, RunWriter, Site, TextConfig, WriterState};
+use crate::app::site::{BuildStage, Progress, RunWriter, Site, TextConfig, WriterState};
 use crate::app::{App, AppError, on_blocking_thread};
 use crate::records::{Generation, Key, RunIdx, delete_prefixes};
 use crate::storage::Batch;
@@ -30,7 +30,7 @@ impl App {
         site: &Arc<Site>,
         progress: &Progress,
     ) -> Result<(), AppError> {
-        progress.at(0.0, "looking at the densities");
+        progress.at(BuildStage::Texts, 0.0)?;
         let Some(quantizer) = outdated_partition(site).await? else { return Ok(()) };
         let state = site.state();
         let old = state.record.generation;
@@ -39,13 +39,13 @@ impl App {
         let text_config =
             TextConfig { engine: Arc::clone(&state.config), quantizer: Some(quantizer.clone()) };
         for run in 0..state.record.num_runs {
-            progress.at(f64::from(run) / f64::from(state.record.num_runs), "writing the texts anew");
-            write_anew(site, run, new, &text_config).await?;
+            progress.at(BuildStage::Texts, f64::from(run) / f64::from(state.record.num_runs))?;
+            write_anew(site, run, new, &text_config, progress).await?;
         }
         let _no_writers = site.serving.write().await;
         // Scans that came meanwhile, and runs that were made.
         for run in 0..site.state().record.num_runs {
-            write_anew(site, run, new, &text_config).await?;
+            write_anew(site, run, new, &text_config, progress).await?;
         }
         site.serve_generation(new, &quantizer).await?;
         tracing::info!(site = %site.name(), generation = new, classes = quantizer.num_classes(), "new texts serve");
@@ -90,11 +90,16 @@ async fn write_anew(
     run: RunIdx,
     generation: Generation,
     text_config: &TextConfig,
+    progress: &Progress,
 ) -> Result<(), AppError> {
     let stored = site.reader().run(run).await?;
+    if stored.record.is_deleted() {
+        return Ok(());
+    }
     let writer = RunWriter::new(run, Arc::clone(&stored.record), 1);
     let mut state = writer.load(site.store(), generation, text_config).await?;
     while state.num_scans_translated() < stored.head.next_sequence {
+        progress.check()?;
         let next = state.num_scans_translated();
         let end = stored.head.next_sequence.min(next + NUM_SCANS_PER_STEP);
         let scans = stored.scans(next..end).await?;

@@ -165,9 +165,7 @@ mod tests {
             version: 1,
             num_components: 2,
             runs: vec![run(0, 0), run(1, 1), run(2, 0), run(3, 0)],
-            num_matches: 0,
-            num_verified: 0,
-            duration_s: 0.0,
+            ..MapRecord::default()
         }
     }
 

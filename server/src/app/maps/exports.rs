@@ -5,7 +5,7 @@ use locution_engine::geometry::Point2;
 use locution_engine::occupancy::{CellState, GridMap};
 use locution_engine::pose_graph::{InformationMatrix, PoseConstraint, PoseGraph};
 
-use super::matches::{MatchFilter, matches};
+use super::matches::{MatchFilter, MatchOrder, matches};
 use crate::app::runs::{Frame, StampedPose, trajectory};
 use crate::app::site::Site;
 use crate::app::{App, AppError, on_blocking_thread};
@@ -36,7 +36,7 @@ pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, A
         }
         add_motions(&mut graph, first, placed).await?;
     }
-    for numbered in matches(map, &MatchFilter::verified(), 0, usize::MAX).await?.0 {
+    for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let found = numbered.found;
         let firsts = [found.earlier.run_idx, found.later.run_idx].map(|run| first_of_run[run as usize]);
         if let ([Some(earlier), Some(later)], Some(fit)) = (firsts, found.evidence.registration) {
@@ -142,7 +142,7 @@ impl App {
 async fn lines_of(map: &Map, component: u32) -> Result<Vec<Line>, AppError> {
     let runs = map.placed_runs(Some(component)).await?;
     let mut lines: Vec<Line> = Vec::new();
-    for numbered in matches(map, &MatchFilter::verified(), 0, usize::MAX).await?.0 {
+    for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let Some(fit) = numbered.found.evidence.registration else { continue };
         let end = |run: u32, keyframe: u32| -> Option<Point2> {
             let placed = runs.iter().find(|placed| placed.map_run.run == run)?;

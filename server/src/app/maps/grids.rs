@@ -18,8 +18,8 @@ const NUM_CELLS_MAX: f64 = 6.4e7;
 /// Keyframes read and drawn at once.
 const NUM_KEYFRAMES_PER_STEP: usize = 500;
 
-/// Names a grid in the cache.
-pub type GridKey = (String, u64, u32);
+/// Names a grid in the cache: birth of the site, map version, component.
+pub type GridKey = (u64, u64, u32);
 
 impl App {
     /// The occupancy grid of one component of a version.
@@ -27,7 +27,7 @@ impl App {
     /// # Errors
     /// [`AppError::NotFound`] for a component that is not in the map.
     pub async fn grid(&self, site: &Site, map: &Map, component: u32) -> Result<Arc<GridMap>, AppError> {
-        let key = (site.name().to_string(), map.record.version, component);
+        let key = (site.birth(), map.record.version, component);
         if let Some(grid) = self.grids.lock().unwrap_or_else(PoisonError::into_inner).get(&key) {
             return Ok(Arc::clone(grid));
         }

@@ -3,11 +3,13 @@
 //! Matches belong to a map version and are numbered within it. A decision belongs to the pair of places: it holds for
 //! every match, of this version and of those to come, whose two stretches of driving overlap the two it was made on.
 
+use std::collections::BTreeMap;
+
 use locution_engine::mapping::{Channel, Decision, Direction, MatchState, PlaceMatch};
 
-use crate::app::AppError;
 use crate::app::site::Site;
-use crate::records::{Key, Map, RunIdx, Visit, codec};
+use crate::app::{AppError, Window};
+use crate::records::{Key, Map, MatchPlace, RunIdx, Visit, codec};
 
 /// A match with its number.
 #[derive(Clone, Debug)]
@@ -15,6 +17,8 @@ pub struct NumberedMatch {
     /// Its number in the map version.
     pub id: u64,
     pub found: PlaceMatch,
+    /// Where and when its stretches were driven; not known of versions of earlier programs.
+    pub place: Option<MatchPlace>,
     /// What a person said of this pair of places: true, it is the same; false, it is not.
     pub decision: Option<bool>,
 }
@@ -40,6 +44,18 @@ impl From<&MatchState> for MatchStateKind {
     }
 }
 
+/// In which order matches are listed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MatchOrder {
+    /// As the version numbers them.
+    #[default]
+    Number,
+    /// The most probable first.
+    Probability,
+    /// The latest revisit first.
+    Time,
+}
+
 /// Which matches to list; what is `None` may be anything.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MatchFilter {
@@ -51,6 +67,14 @@ pub struct MatchFilter {
     pub direction: Option<Direction>,
     /// Number of a run that takes part.
     pub run: Option<RunIdx>,
+    /// Component of the map in which one of its stretches lies.
+    pub component: Option<u32>,
+    /// What a person said of it: nothing, that it is the same place, or that it is not.
+    pub decision: Option<Option<bool>>,
+    /// Least and greatest probability.
+    pub probability: Option<(f64, f64)>,
+    /// One of its stretches was driven then, and lies there.
+    pub window: Window,
 }
 
 impl MatchFilter {
@@ -66,32 +90,111 @@ impl MatchFilter {
             && self.direction.is_none_or(|direction| direction == found.direction)
             && self.run.is_none_or(|run| found.earlier.run_idx == run || found.later.run_idx == run)
     }
+
+    /// Whether a match passes, with what is known beside it.
+    fn accepts_all_of(&self, numbered: &NumberedMatch) -> bool {
+        let probability = numbered.found.probability;
+        self.accepts(&numbered.found)
+            && self.decision.is_none_or(|decision| decision == numbered.decision)
+            && self.probability.is_none_or(|(min, max)| (min..=max).contains(&probability))
+            && (self.component.is_none() && self.window.is_everything()
+                || numbered.place.is_some_and(|place| self.is_there(&place)))
+    }
+
+    /// Whether one of the two stretches was driven in the window.
+    fn is_there(&self, place: &MatchPlace) -> bool {
+        [place.earlier, place.later].iter().any(|stretch| {
+            self.component.is_none_or(|component| component == stretch.component)
+                && self.window.holds_time(stretch.timestamps_ns)
+                && self.window.holds_place(&stretch.map_from_middle.position())
+        })
+    }
 }
 
-/// Up to `limit` matches that pass a filter, from number `from` on, and the number to go on with.
+/// Up to `limit` matches that pass a filter, and the number to go on with. `from` is what the page before gave: a number
+/// of the version in the order of numbers, a count of matches in another.
+///
+/// # Errors
+/// Those of the storage.
 pub async fn matches(
     map: &Map,
     filter: &MatchFilter,
+    order: MatchOrder,
     from: u64,
     limit: usize,
 ) -> Result<(Vec<NumberedMatch>, Option<u64>), AppError> {
     let decisions = decisions(map).await?;
+    let places = map.match_places().await?;
+    let numbered = |id: u64, found: PlaceMatch| {
+        let place = usize::try_from(id).ok().and_then(|idx| places.get(idx).copied().flatten());
+        let decision = decision_on(&decisions, &found);
+        NumberedMatch { id, found, place, decision }
+    };
+    if order == MatchOrder::Number {
+        return page_of_numbers(map, filter, numbered, from, limit).await;
+    }
+    // First only what they are ordered by: all matches at once would take much memory.
+    let mut keys = Vec::new();
+    map.visit_matches(0, |id, found| {
+        let numbered = numbered(id, found);
+        if filter.accepts_all_of(&numbered) {
+            keys.push((order_key(&numbered, order), id));
+        }
+        Visit::GoOn
+    })
+    .await?;
+    keys.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    let first = usize::try_from(from).unwrap_or(usize::MAX).min(keys.len());
+    let end = first.saturating_add(limit).min(keys.len());
+    let ranks: BTreeMap<u64, usize> =
+        keys[first..end].iter().enumerate().map(|(rank, (_, id))| (*id, rank)).collect();
+    let mut page = Vec::new();
+    map.visit_matches(ranks.keys().next().copied().unwrap_or(u64::MAX), |id, found| {
+        if let Some(rank) = ranks.get(&id) {
+            page.push((*rank, numbered(id, found)));
+        }
+        if page.len() == ranks.len() { Visit::Enough } else { Visit::GoOn }
+    })
+    .await?;
+    page.sort_by_key(|(rank, _)| *rank);
+    let next = (end < keys.len()).then_some(end as u64);
+    Ok((page.into_iter().map(|(_, numbered)| numbered).collect(), next))
+}
+
+async fn page_of_numbers(
+    map: &Map,
+    filter: &MatchFilter,
+    numbered: impl Fn(u64, PlaceMatch) -> NumberedMatch + Send,
+    from: u64,
+    limit: usize,
+) -> Result<(Vec<NumberedMatch>, Option<u64>), AppError> {
     let mut page = Vec::new();
     let mut next = None;
     map.visit_matches(from, |id, found| {
-        if !filter.accepts(&found) {
+        let numbered = numbered(id, found);
+        if !filter.accepts_all_of(&numbered) {
             return Visit::GoOn;
         }
         if page.len() == limit {
             next = Some(id);
             return Visit::Enough;
         }
-        let decision = decision_on(&decisions, &found);
-        page.push(NumberedMatch { id, found, decision });
+        page.push(numbered);
         Visit::GoOn
     })
     .await?;
     Ok((page, next))
+}
+
+/// What matches are ordered by, the greatest first.
+fn order_key(numbered: &NumberedMatch, order: MatchOrder) -> f64 {
+    match order {
+        MatchOrder::Number => -(numbered.id as f64),
+        MatchOrder::Probability => numbered.found.probability,
+        MatchOrder::Time => {
+            numbered.place.map_or(f64::NEG_INFINITY, |place| place.later.timestamps_ns.0 as f64)
+        }
+    }
 }
 
 /// One match of a version.
@@ -100,8 +203,10 @@ pub async fn matches(
 /// [`AppError::NotFound`].
 pub async fn a_match(map: &Map, id: u64) -> Result<NumberedMatch, AppError> {
     let found = map.a_match(id).await?.ok_or_else(|| AppError::not_found("match", id))?;
+    let places = map.match_places().await?;
     let decision = decision_on(&decisions(map).await?, &found);
-    Ok(NumberedMatch { id, found, decision })
+    let place = usize::try_from(id).ok().and_then(|idx| places.get(idx).copied().flatten());
+    Ok(NumberedMatch { id, found, place, decision })
 }
 
 /// Says of a pair of places whether it is the same; what was said of it before no longer holds.

@@ -13,7 +13,9 @@ pub use changes::{NoSessions, Sessions};
 pub use exports::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
 pub use grids::GridKey;
 pub use labels::{DrivenStretch, LabelAnswer, find_labels, labels};
-pub use matches::{MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide};
+pub use matches::{
+    MatchFilter, MatchOrder, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide,
+};
 pub use places::{find_route, places};
 pub use regions::{Topology, topology};
-pub use write::{WrittenRun, serve_map, write_map};
+pub use write::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};

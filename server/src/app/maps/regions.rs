@@ -6,7 +6,7 @@
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::Interval;
 
-use super::matches::{MatchFilter, matches};
+use super::matches::{MatchFilter, MatchOrder, matches};
 use crate::app::AppError;
 use crate::records::{Map, PlacedRun};
 
@@ -48,7 +48,7 @@ pub async fn topology(map: &Map, runs: &[PlacedRun]) -> Result<Topology, AppErro
         topology.regions.extend(regions_of(placed).await?);
         topology.driven.extend((first + 1..topology.regions.len()).map(|idx| (idx - 1, idx)));
     }
-    for numbered in matches(map, &MatchFilter::verified(), 0, usize::MAX).await?.0 {
+    for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let sides =
             [&numbered.found.earlier, &numbered.found.later].map(|side| region_at(&topology.regions, side));
         if let [Some(earlier), Some(later)] = sides

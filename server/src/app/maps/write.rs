@@ -2,12 +2,13 @@
 
 use locution_engine::mapping::{MatchState, SiteMap};
 use locution_engine::semantics::MapLabels;
+use sha2::{Digest as _, Sha256};
 
 use crate::app::AppError;
 use crate::app::site::Site;
 use crate::records::{
-    Key, Map, MapPose, MapRecord, MapRun, MapVersion, PartKind, RunIdx, StoredLabel, append_places, codec,
-    delete_prefixes, match_chunks, series,
+    Digest, Key, Map, MapPose, MapRecord, MapRun, MapVersion, MatchPlace, PartKind, RunIdx, StoredLabel,
+    append_places, delete_prefixes, match_chunks, series,
 };
 use crate::storage::{Batch, SiteStore, StorageError};
 
@@ -24,66 +25,108 @@ pub struct WrittenRun {
     pub keyframe_seqs: Vec<u64>,
 }
 
-/// Writes a version into fresh keys; it does not serve yet.
-pub async fn write_map(
-    site: &Site,
-    map: &SiteMap,
-    labeled: &MapLabels,
-    runs: &[WrittenRun],
-    duration_s: f64,
-) -> Result<Map, AppError> {
-    let store = site.store();
-    let version = site.state().record.map_version + 1;
-    // What an interrupted build left under this number must not mix with what is written now.
-    delete_prefixes(store, &Key::all_of_map(version)).await?;
-    let is_verified = |state: &MatchState| *state == MatchState::Verified;
-    let mut record = MapRecord {
-        version,
-        num_components: map.num_components,
-        runs: Vec::new(),
-        num_matches: map.matches.len() as u64,
-        num_verified: map.matches.iter().filter(|found| is_verified(&found.state)).count() as u64,
-        duration_s,
-    };
-    let mut batch = Batch::default();
-    let (mut first_pose, mut first_label) = (0, 0);
-    for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(&labeled.labels) {
-        let poses: Vec<MapPose> = written
-            .keyframe_seqs
-            .iter()
-            .zip(&mapped.map_from_keyframes)
-            .map(|(scan_seq, pose)| MapPose { scan_seq: *scan_seq, map_from_robot: *pose })
-            .collect();
-        series::append(&mut batch, &poses, first_pose, |n| Key::MapPart(version, PartKind::Poses, n));
-        let labels: Vec<StoredLabel> = labels.iter().map(StoredLabel::from).collect();
-        series::append(&mut batch, &labels, first_label, |n| Key::MapPart(version, PartKind::Labels, n));
-        let steps = poses.windows(2).map(|two| two[0].map_from_robot.distance(&two[1].map_from_robot));
-        record.runs.push(MapRun {
-            run: written.run,
-            name: written.name.clone(),
-            component: mapped.component,
-            first_pose,
-            num_poses: poses.len() as u64,
-            first_label,
-            num_labels: labels.len() as u64,
-            num_scans: written.num_scans,
-            length_m: steps.sum(),
-        });
-        first_pose += poses.len() as u64;
-        first_label += labels.len() as u64;
-        commit_when_large(store, &mut batch).await?;
+/// A version that is ready to be written.
+pub struct MapDraft {
+    record: MapRecord,
+    values: Batch,
+}
+
+impl MapDraft {
+    /// The next version of a site's map.
+    ///
+    /// # Errors
+    /// [`AppError::Internal`] when a part of the map cannot be written.
+    pub fn new(
+        site: &Site,
+        map: &SiteMap,
+        labeled: &MapLabels,
+        match_places: &[Option<MatchPlace>],
+        runs: &[WrittenRun],
+        made_of: Digest,
+    ) -> Result<Self, AppError> {
+        let version = site.state().record.map_version + 1;
+        let is_verified = |state: &MatchState| *state == MatchState::Verified;
+        let mut record = MapRecord {
+            version,
+            num_components: map.num_components,
+            num_matches: map.matches.len() as u64,
+            num_verified: map.matches.iter().filter(|found| is_verified(&found.state)).count() as u64,
+            has_match_places: true,
+            made_of,
+            ..MapRecord::default()
+        };
+        let mut values = Batch::default();
+        let (mut first_pose, mut first_label) = (0, 0);
+        for ((written, mapped), labels) in runs.iter().zip(&map.runs).zip(&labeled.labels) {
+            let seqs = written.keyframe_seqs.iter();
+            let poses: Vec<MapPose> = seqs
+                .zip(&mapped.map_from_keyframes)
+                .map(|(scan_seq, pose)| MapPose { scan_seq: *scan_seq, map_from_robot: *pose })
+                .collect();
+            series::append(&mut values, &poses, first_pose, |n| Key::MapPart(version, PartKind::Poses, n));
+            let labels: Vec<StoredLabel> = labels.iter().map(StoredLabel::from).collect();
+            series::append(&mut values, &labels, first_label, |n| Key::MapPart(version, PartKind::Labels, n));
+            let steps = poses.windows(2).map(|two| two[0].map_from_robot.distance(&two[1].map_from_robot));
+            record.runs.push(MapRun {
+                run: written.run,
+                name: written.name.clone(),
+                component: mapped.component,
+                first_pose,
+                num_poses: poses.len() as u64,
+                first_label,
+                num_labels: labels.len() as u64,
+                num_scans: written.num_scans,
+                length_m: steps.sum(),
+            });
+            first_pose += poses.len() as u64;
+            first_label += labels.len() as u64;
+        }
+        for (component, places) in &labeled.places {
+            append_places(&mut values, version, *component, places).map_err(AppError::internal)?;
+        }
+        for (key, chunk) in match_chunks(version, &map.matches).map_err(AppError::internal)? {
+            values.put(key.encode(), chunk);
+        }
+        series::append(&mut values, match_places, 0, |n| Key::MapPart(version, PartKind::MatchPlaces, n));
+        record.content = content_of(&record, &values);
+        Ok(Self { record, values })
     }
-    for (component, places) in &labeled.places {
-        append_places(&mut batch, version, *component, places).map_err(AppError::internal)?;
-        commit_when_large(store, &mut batch).await?;
+
+    /// Whether a version holds the very same.
+    pub fn is_same_as(&self, record: &MapRecord) -> bool {
+        self.record.content == record.content
     }
-    for (key, chunk) in match_chunks(version, &map.matches).map_err(AppError::internal)? {
-        batch.put(key.encode(), chunk);
-        commit_when_large(store, &mut batch).await?;
+
+    /// Writes the version into fresh keys; it does not serve yet.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn write(mut self, site: &Site, duration_s: f64) -> Result<Map, AppError> {
+        self.record.duration_s = duration_s;
+        let store = site.store();
+        // What an interrupted build left under this number must not mix with what is written now.
+        delete_prefixes(store, &Key::all_of_map(self.record.version)).await?;
+        let mut batch = Batch::default();
+        for write in self.values.writes {
+            batch.writes.push(write);
+            commit_when_large(store, &mut batch).await?;
+        }
+        batch.put(Key::Map(self.record.version).encode(), self.record.encode());
+        store.commit(batch, vec![]).await?;
+        Ok(Map::new(self.record, site.reader()))
     }
-    batch.put(Key::Map(version).encode(), codec::encode(&record));
-    store.commit(batch, vec![]).await?;
-    Ok(Map::new(record, site.reader()))
+}
+
+/// The digest of a version: of its runs and values, whatever its number and however long it took.
+fn content_of(record: &MapRecord, values: &Batch) -> Digest {
+    let numbered = MapRecord { version: 0, duration_s: 0.0, made_of: Digest::default(), ..record.clone() };
+    let mut hasher = Sha256::new();
+    hasher.update(numbered.encode());
+    for bytes in values.writes.iter().filter_map(|(_, value)| value.as_ref()) {
+        hasher.update((bytes.len() as u64).to_le_bytes());
+        hasher.update(bytes);
+    }
+    hasher.finalize().into()
 }
 
 async fn commit_when_large(store: &dyn SiteStore, batch: &mut Batch) -> Result<(), StorageError> {
@@ -93,13 +136,34 @@ async fn commit_when_large(store: &dyn SiteStore, batch: &mut Batch) -> Result<(
     Ok(())
 }
 
-/// Makes a written version the serving one, in one step, and drops versions beyond those kept.
-pub async fn serve_map(site: &Site, version: MapVersion, num_kept: usize) -> Result<(), AppError> {
+/// Notes that a version is what other input makes, too, so that the next build of it need not find out again.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn note_made_of(site: &Site, record: &MapRecord, made_of: Digest) -> Result<(), AppError> {
+    let record = MapRecord { made_of, ..record.clone() };
+    let mut batch = Batch::default();
+    batch.put(Key::Map(record.version).encode(), record.encode());
+    Ok(site.store().commit(batch, vec![]).await?)
+}
+
+/// Makes a written version the serving one, in one step.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn serve_map(site: &Site, version: MapVersion) -> Result<(), AppError> {
     site.change(|record, _| {
         record.map_version = version;
         Ok(())
     })
-    .await?;
+    .await
+}
+
+/// Drops the oldest versions beyond a number.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn drop_versions(site: &Site, num_kept: usize) -> Result<(), AppError> {
     let versions = site.map_versions().await?;
     for stale in &versions[..versions.len().saturating_sub(num_kept)] {
         delete_prefixes(site.store(), &Key::all_of_map(*stale)).await?;

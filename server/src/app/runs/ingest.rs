@@ -14,7 +14,7 @@ use std::time::Instant;
 use locution_engine::geometry::Pose2;
 use locution_engine::scan::{Scan, ScanGeometry};
 
-use crate::app::site::{RunWriter, Site, WriterState};
+use crate::app::site::{RunChange, RunWriter, Site, SiteEvent, WriterState};
 use crate::app::{App, AppError, Name, on_blocking_thread};
 use crate::records::{Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans};
 use crate::storage::Batch;
@@ -86,6 +86,8 @@ impl App {
             let mut state = app.wake(&for_task, &writer, slot.take()).await?;
             if !state.head.value.is_finished {
                 finish(&for_task, &writer, &mut state).await?;
+                let run = writer.record.name.clone();
+                for_task.events().tell(SiteEvent::Run { run, change: RunChange::Finished });
                 app.build_soon(&for_task);
             }
             Ok::<_, AppError>(())
@@ -137,7 +139,9 @@ impl App {
         check_odometry(&batch.scans, num_repeated, state.head.value.last_odom_from_robot, step_max_m)?;
         let fresh = batch.scans.split_off(num_repeated);
         let interval = self.config().storage.num_scans_per_checkpoint;
-        append_fresh(site, writer, state, fresh, interval).await
+        let receipt = append_fresh(site, writer, state, fresh, interval).await?;
+        site.events().tell(SiteEvent::Words { run: writer.record.name.clone(), receipt });
+        Ok(receipt)
     }
 }
 

@@ -2,7 +2,7 @@
 
 use locution_engine::scan::ScanGeometry;
 
-use crate::app::site::{RunTranslator, Site};
+use crate::app::site::{RunChange, RunTranslator, Site, SiteEvent};
 use crate::app::{App, AppError, Name};
 use crate::records::{Key, Run, RunHead, RunRecord, SiteRecord, codec};
 use crate::storage::Batch;
@@ -45,7 +45,7 @@ impl App {
         let num_runs_max = self.config().limits.num_runs_per_site_max;
         let run = RunRecord { name: name.to_string(), robot: new.robot, geometry: new.geometry };
         let create = |record: &mut SiteRecord, batch: &mut Batch| {
-            if record.num_runs >= num_runs_max {
+            if record.num_runs - record.num_deleted_runs >= num_runs_max {
                 return Err(AppError::invalid(
                     "run",
                     format!("the site holds {num_runs_max} runs, its limit"),
@@ -59,6 +59,9 @@ impl App {
             Ok(())
         };
         let made = create_unless_named(site, name, create).await?;
+        if made {
+            site.events().tell(SiteEvent::Run { run: name.to_string(), change: RunChange::Made });
+        }
         Ok((site.run(name).await?, made))
     }
 }

@@ -7,7 +7,7 @@ use locution_engine::recording::{PlacedKeyframe, RunTrajectory};
 
 use crate::app::AppError;
 use crate::app::site::Site;
-use crate::records::{MapVersion, Run};
+use crate::records::{MapRecord, MapVersion, Run};
 
 /// In whose coordinates poses are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,18 +61,19 @@ pub async fn trajectory(
         }
         Frame::Map => {
             let map = site.map(version).await?;
-            let in_map = map.record.run(run.idx).ok_or_else(|| AppError::NotReady {
-                detail: format!(
-                    "the run `{}` came after map version {}",
-                    run.record.name, map.record.version
-                ),
-            })?;
+            let in_map = map.record.run(run.idx).ok_or_else(|| not_in(run, &map.record))?;
             component = Some(in_map.component);
             let poses = map.poses(in_map).await?;
             poses.iter().map(|pose| (pose.scan_seq, pose.map_from_robot)).collect()
         }
     };
     Ok(Trajectory { component, poses: spread(&stamps, &known) })
+}
+
+/// A map version from before a run.
+pub(super) fn not_in(run: &Run, map: &MapRecord) -> AppError {
+    let detail = format!("the run `{}` came after map version {}", run.record.name, map.version);
+    AppError::NotReady { detail }
 }
 
 /// A pose for every scan, from odometry and the poses of some scans.

@@ -1,14 +1,16 @@
-//! Long work as resources: queued, running, done or failed, with progress, across restarts.
+//! Long work as resources: queued, running, done, failed or cancelled, with progress, across restarts.
 //!
 //! A job that is stored as queued or running when the server starts was interrupted: it begins anew, because jobs are
 //! pure functions of what is stored, unless it was interrupted too often, and then it failed and says so.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
 
 use tokio::sync::Notify;
+use tokio_util::sync::CancellationToken;
 
+use super::progress::{Progress, StageTimes};
 use crate::app::AppError;
 use crate::records::{JobKind, JobRecord, JobState, Key, codec};
 use crate::storage::{Batch, SiteStore};
@@ -24,43 +26,24 @@ pub struct JobInfo {
     pub record: JobRecord,
     /// From 0 to 1.
     pub progress: f64,
-}
-
-/// How a job tells where it is, from any thread.
-#[derive(Debug, Default)]
-pub struct Progress {
-    permille: AtomicU32,
-    detail: Mutex<String>,
-}
-
-impl Progress {
-    /// Says what is being done, and how much of the whole was done before, from 0 to 1.
-    pub fn at(&self, share: f64, detail: &str) {
-        self.permille.store((share.clamp(0.0, 1.0) * 1000.0) as u32, Ordering::Relaxed);
-        detail.clone_into(&mut self.detail.lock().unwrap_or_else(PoisonError::into_inner));
-    }
-
-    fn share(&self) -> f64 {
-        f64::from(self.permille.load(Ordering::Relaxed)) / 1000.0
-    }
-
-    /// What is being done.
-    pub fn detail(&self) -> String {
-        self.detail.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
+    /// Time that it will still take, when that can be told.
+    pub left: Option<Duration>,
 }
 
 /// The jobs of a site that are known to this process.
-#[derive(Default)]
 pub struct Jobs {
     table: Mutex<JobTable>,
     ended: Notify,
+    /// Set when the site is deleted or the server stops.
+    stop: CancellationToken,
 }
 
 #[derive(Default)]
 struct JobTable {
     jobs: BTreeMap<u64, (JobRecord, Arc<Progress>)>,
     is_working: bool,
+    /// What the stages of the last build took.
+    times: StageTimes,
 }
 
 impl JobTable {
@@ -71,8 +54,8 @@ impl JobTable {
 
 impl Jobs {
     /// Reads the jobs of earlier processes; what they left unfinished is queued again or failed.
-    pub async fn load(store: &dyn SiteStore) -> Result<Self, AppError> {
-        let jobs = Self::default();
+    pub async fn load(store: &dyn SiteStore, stop: CancellationToken) -> Result<Self, AppError> {
+        let jobs = Self { table: Mutex::default(), ended: Notify::new(), stop };
         let mut batch = Batch::default();
         for (_, bytes) in store.scan(&Key::all_jobs(), &[], usize::MAX).await? {
             let mut record: JobRecord = codec::decode(&bytes, "a job")?;
@@ -103,6 +86,13 @@ impl Jobs {
         Ok(info(record, progress))
     }
 
+    /// How many jobs wait and how many run.
+    pub fn num_jobs(&self) -> (usize, usize) {
+        let table = self.table();
+        let num = |state| table.jobs.values().filter(|(job, _)| job.state == state).count();
+        (num(JobState::Queued), num(JobState::Running))
+    }
+
     /// All jobs, the newest first.
     pub fn all(&self) -> Vec<JobInfo> {
         self.table().jobs.values().rev().map(|(record, progress)| info(record, progress)).collect()
@@ -111,16 +101,49 @@ impl Jobs {
     /// Returns once a job has ended.
     ///
     /// # Errors
-    /// [`AppError::NotFound`].
+    /// [`AppError::NotFound`]; [`AppError::Stopping`] when the site is deleted or the server stops before.
     pub async fn ended(&self, id: u64) -> Result<JobInfo, AppError> {
         loop {
             let ended = self.ended.notified();
             let job = self.get(id)?;
-            if matches!(job.record.state, JobState::Done | JobState::Failed) {
+            if has_ended(&job.record) {
                 return Ok(job);
             }
-            ended.await;
+            tokio::select! {
+                () = ended => {}
+                () = self.stop.cancelled() => return Err(AppError::Stopping),
+            }
         }
+    }
+
+    /// Cancels a job: one that waits is over at once and answered, to be stored; one that runs ends at its next step.
+    ///
+    /// # Errors
+    /// [`AppError::NotFound`].
+    pub fn cancel(&self, id: u64) -> Result<Option<JobRecord>, AppError> {
+        let mut table = self.table();
+        let (record, progress) = table.jobs.get_mut(&id).ok_or_else(|| AppError::not_found("job", id))?;
+        progress.cancel();
+        if record.state != JobState::Queued {
+            return Ok(None);
+        }
+        record.state = JobState::Cancelled;
+        record.detail = "cancelled before it began".into();
+        Ok(Some(record.clone()))
+    }
+
+    /// Begins a job whose turn has come; none when it was cancelled meanwhile.
+    pub fn begin(&self, id: u64) -> Option<JobRecord> {
+        let mut table = self.table();
+        let (record, _) = table.jobs.get_mut(&id).filter(|(job, _)| job.state == JobState::Queued)?;
+        record.state = JobState::Running;
+        record.num_attempts += 1;
+        Some(record.clone())
+    }
+
+    /// Notes what the stages of a build took, for the progress of the next.
+    pub fn note_times(&self, times: StageTimes) {
+        self.table().times = times;
     }
 
     /// A job of a kind that waits for its turn.
@@ -131,7 +154,9 @@ impl Jobs {
 
     /// Takes up a job that was just stored.
     pub fn insert(&self, record: JobRecord) {
-        self.table().jobs.insert(record.id, (record, Arc::default()));
+        let mut table = self.table();
+        let progress = Progress::new(table.times, self.stop.clone());
+        table.jobs.insert(record.id, (record, Arc::new(progress)));
     }
 
     /// Makes the caller the one that works on the jobs; false when there is one, or nothing to do.
@@ -176,11 +201,10 @@ impl Jobs {
     fn forget_old_jobs(&self) -> Vec<u64> {
         let mut table = self.table();
         let surplus = table.jobs.len().saturating_sub(NUM_ENDED_KEPT);
-        let is_ended = |job: &JobRecord| matches!(job.state, JobState::Done | JobState::Failed);
         let stale: Vec<u64> = table
             .jobs
             .values()
-            .filter(|(job, _)| is_ended(job))
+            .filter(|(job, _)| has_ended(job))
             .map(|(job, _)| job.id)
             .take(surplus)
             .collect();
@@ -193,19 +217,24 @@ impl Jobs {
     }
 }
 
+fn has_ended(job: &JobRecord) -> bool {
+    matches!(job.state, JobState::Done | JobState::Failed | JobState::Cancelled)
+}
+
 fn info(record: &JobRecord, progress: &Progress) -> JobInfo {
     let mut record = record.clone();
-    let mut share = progress.share();
+    let (mut share, mut left) = (progress.share(), None);
     match record.state {
         JobState::Done => share = 1.0,
-        JobState::Running => record.detail = progress.detail(),
+        JobState::Running => (record.detail, left) = (progress.detail().into(), progress.left()),
         _ => {}
     }
-    JobInfo { record, progress: share }
+    JobInfo { record, progress: share, left }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::progress::Ending;
     use super::*;
     use crate::storage::{MemoryStorage, Storage};
 
@@ -219,6 +248,10 @@ mod tests {
         jobs.iter().for_each(|job| batch.put(Key::Job(job.id).encode(), codec::encode(job)));
         store.commit(batch, vec![]).await.unwrap();
         store
+    }
+
+    async fn loaded(store: &dyn SiteStore) -> Jobs {
+        Jobs::load(store, CancellationToken::new()).await.unwrap()
     }
 
     fn states(jobs: &Jobs) -> Vec<(u64, JobState)> {
@@ -236,16 +269,16 @@ mod tests {
         .await;
         let expected =
             [(4, JobState::Queued), (3, JobState::Queued), (2, JobState::Failed), (1, JobState::Done)];
-        let jobs = Jobs::load(&*store).await.unwrap();
+        let jobs = loaded(&*store).await;
         assert_eq!(states(&jobs), expected);
         assert!(jobs.get(2).unwrap().record.error.unwrap().contains("interrupted 3 times"));
-        assert_eq!(states(&Jobs::load(&*store).await.unwrap()), expected, "it is stored, too");
+        assert_eq!(states(&loaded(&*store).await), expected, "it is stored, too");
     }
 
     #[tokio::test]
     async fn jobs_are_worked_on_by_one_and_in_order() {
         let store = stored(&[job(7, JobState::Queued, 0), job(8, JobState::Queued, 0)]).await;
-        let jobs = Jobs::load(&*store).await.unwrap();
+        let jobs = loaded(&*store).await;
         assert!(jobs.begin_work());
         assert!(!jobs.begin_work(), "somebody works already");
         for id in [7, 8] {
@@ -261,17 +294,41 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn a_waiting_job_that_is_cancelled_never_begins_and_a_running_one_is_told() {
+        let store = stored(&[job(1, JobState::Queued, 0), job(2, JobState::Queued, 0)]).await;
+        let jobs = loaded(&*store).await;
+        let (first, progress) = jobs.next().unwrap();
+        assert_eq!(jobs.begin(first.id).unwrap().num_attempts, 1);
+        let cancelled = jobs.cancel(2).unwrap().unwrap();
+        assert_eq!(cancelled.state, JobState::Cancelled);
+        assert!(jobs.begin(2).is_none(), "it was cancelled before its turn came");
+        assert_eq!(jobs.ended(2).await.unwrap().record.state, JobState::Cancelled);
+        assert!(jobs.cancel(1).unwrap().is_none(), "it runs");
+        assert_eq!(progress.ending(), Some(Ending::Cancelled));
+        assert!(matches!(jobs.cancel(3), Err(AppError::NotFound { .. })));
+    }
+
+    #[tokio::test]
+    async fn nobody_waits_for_a_job_of_a_site_that_ends() {
+        let store = stored(&[job(1, JobState::Queued, 0)]).await;
+        let stop = CancellationToken::new();
+        let jobs = Jobs::load(&*store, stop.clone()).await.unwrap();
+        let (outcome, ()) = tokio::join!(jobs.ended(1), async { stop.cancel() });
+        assert!(matches!(outcome, Err(AppError::Stopping)));
+    }
+
+    #[tokio::test]
     async fn the_oldest_of_too_many_ended_jobs_are_forgotten_and_no_others() {
         let mut all = vec![job(1, JobState::Queued, 0)];
         all.extend((2..=NUM_ENDED_KEPT as u64 + 2).map(|id| job(id, JobState::Done, 1)));
         let store = stored(&all).await;
-        let jobs = Jobs::load(&*store).await.unwrap();
+        let jobs = loaded(&*store).await;
         let newest = job(NUM_ENDED_KEPT as u64 + 3, JobState::Done, 1);
         jobs.insert(newest.clone());
         jobs.store(&*store, &newest).await.unwrap();
         assert_eq!(jobs.all().len(), NUM_ENDED_KEPT);
         assert!(jobs.get(1).is_ok(), "it waits");
         assert!(jobs.get(2).is_err() && jobs.get(newest.id).is_ok());
-        assert_eq!(states(&Jobs::load(&*store).await.unwrap()), states(&jobs));
+        assert_eq!(states(&loaded(&*store).await), states(&jobs));
     }
 }

@@ -3,9 +3,13 @@
 //! The parts (writers of runs, jobs, texts) do not know the site that owns them: they are handed its storage and what
 //! they need of its record. Questions and work on a site are use cases of the folders beside this one.
 
+mod events;
 mod jobs;
+mod progress;
+mod registrations;
 mod run_writer;
 mod state;
+mod text_budget;
 mod texts;
 mod translation;
 
@@ -15,8 +19,8 @@ use std::sync::{Arc, Mutex, PoisonError, RwLock};
 
 use bytes::Bytes;
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::RegistrationMemo;
 use locution_engine::text::Quantizer;
+use tokio_util::sync::CancellationToken;
 
 use super::{AppError, Name};
 use crate::records::{
@@ -24,10 +28,15 @@ use crate::records::{
 };
 use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 
-pub use jobs::{JobInfo, Jobs, Progress};
+pub use events::{EventId, Events, RunChange, SiteEvent, Watched};
+pub use jobs::{JobInfo, Jobs};
+pub use progress::{BuildStage, Ending, Progress};
+pub use registrations::Registrations;
 pub use run_writer::{RunWriter, WriterState};
 pub use state::{SiteState, TextConfig};
-pub use texts::{Segment, SiteTexts};
+pub use text_budget::TextBudget;
+pub use texts::Segment;
+use texts::SiteTexts;
 pub use translation::RunTranslator;
 
 /// A site that is open.
@@ -42,10 +51,14 @@ pub struct Site {
     /// Held for reading while scans are appended, for writing while another text generation begins to serve.
     pub(in crate::app) serving: tokio::sync::RwLock<()>,
     jobs: Jobs,
+    events: Arc<Events>,
     pub(in crate::app) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
-    pub(in crate::app) memo: Mutex<RegistrationMemo>,
-    texts: SiteTexts,
+    pub(in crate::app) registrations: Registrations,
+    texts: Arc<SiteTexts>,
+    text_budget: Arc<TextBudget>,
+    /// Set when the site is deleted or the server ends: jobs give way.
+    pub(in crate::app) stop: CancellationToken,
 }
 
 /// What a site is and holds.
@@ -65,6 +78,13 @@ pub struct SiteInfo {
     pub num_bytes_on_disk: u64,
 }
 
+impl SiteInfo {
+    /// Runs that are there.
+    pub fn num_runs(&self) -> u32 {
+        self.record.num_runs - self.record.num_deleted_runs
+    }
+}
+
 impl Site {
     /// Opens what a storage holds of a site; one from before sites had a birth is given one.
     ///
@@ -73,6 +93,8 @@ impl Site {
     pub(in crate::app) async fn open(
         name: &Name,
         store: Arc<dyn SiteStore>,
+        text_budget: Arc<TextBudget>,
+        stop: CancellationToken,
         birth_if_none: u64,
     ) -> Result<Self, AppError> {
         let bytes = store.get(&Key::Site.encode()).await?.ok_or_else(|| AppError::not_found("site", name))?;
@@ -80,21 +102,34 @@ impl Site {
         let site = Self {
             name: name.clone(),
             state: RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?)),
-            jobs: Jobs::load(&*store).await?,
+            jobs: Jobs::load(&*store, stop.clone()).await?,
+            events: Arc::new(Events::new(stop.clone())),
             store,
             writers: Mutex::default(),
             changing: tokio::sync::Mutex::default(),
             making_runs: tokio::sync::Mutex::default(),
             serving: tokio::sync::RwLock::default(),
             build_requests: AtomicU64::new(0),
-            memo: Mutex::default(),
-            texts: SiteTexts::default(),
+            registrations: Registrations::default(),
+            texts: Arc::default(),
+            text_budget,
+            stop,
         };
         if is_outdated {
             // The birth just drawn must be the same after the next start.
             site.change(|_, _| Ok(())).await.or_else(unless_full)?;
         }
         Ok(site)
+    }
+
+    /// Tells this site from any other that had or will have its name.
+    pub fn birth(&self) -> u64 {
+        self.state().record.birth
+    }
+
+    /// Bytes of the indexes of its texts.
+    pub(in crate::app) fn num_index_bytes(&self) -> usize {
+        self.texts.num_index_bytes()
     }
 
     pub fn name(&self) -> &Name {
@@ -162,7 +197,11 @@ impl Site {
             self.reload(&before).await?;
             return Err(error.into());
         }
-        self.put_state(SiteState { record, config: Arc::clone(&before.config), bytes });
+        let config = match record.config_json == before.record.config_json {
+            true => Arc::clone(&before.config),
+            false => SiteState::decode(bytes.clone(), record.birth)?.config,
+        };
+        self.put_state(SiteState { record, config, bytes });
         Ok(answer)
     }
 
@@ -190,15 +229,34 @@ impl Site {
         }
     }
 
-    /// Up to `limit` runs from number `from` on, in the order of their making.
-    pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<Vec<Run>, AppError> {
-        let end = from.saturating_add(u32::try_from(limit).unwrap_or(u32::MAX));
+    /// Up to `limit` runs from number `from` on, in the order of their making, and the number to go on with.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn runs(&self, from: RunIdx, limit: usize) -> Result<(Vec<Run>, Option<RunIdx>), AppError> {
         let reader = self.reader();
         let mut runs = Vec::new();
-        for idx in from..end.min(self.state().record.num_runs) {
-            runs.push(reader.run(idx).await?);
+        for idx in from..self.state().record.num_runs {
+            let run = reader.run(idx).await?;
+            if run.record.is_deleted() {
+                continue;
+            }
+            if runs.len() == limit {
+                return Ok((runs, Some(idx)));
+            }
+            runs.push(run);
         }
-        Ok(runs)
+        Ok((runs, None))
+    }
+
+    /// Lets go of the writer of a run that was deleted.
+    pub(in crate::app) fn let_go(&self, name: &Name) {
+        self.writers.lock().unwrap_or_else(PoisonError::into_inner).remove(name);
+    }
+
+    /// Reads and indexes all texts anew when they are next asked about.
+    pub(in crate::app) async fn forget_texts(&self) {
+        self.texts.forget().await;
     }
 
     /// The one writer of a run.
@@ -250,9 +308,16 @@ impl Site {
         &self.jobs
     }
 
+    /// What happens in it.
+    pub fn events(&self) -> &Arc<Events> {
+        &self.events
+    }
+
     /// All texts as they stand, indexed.
     pub(in crate::app) async fn text_segments(&self) -> Result<Vec<Arc<Segment>>, AppError> {
-        self.texts.segments(&self.store, &self.state().record).await
+        let segments = self.texts.segments(&self.store, &self.state().record).await?;
+        self.text_budget.used(&self.texts);
+        Ok(segments)
     }
 
     /// What it holds, counted over the heads of its runs.

@@ -10,6 +10,7 @@
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU64;
 
 use locution_engine::index::{Lattice, OccurrenceIndex, store_words};
 use tokio::sync::Mutex;
@@ -30,7 +31,11 @@ pub struct Segment {
 
 /// The texts of a site as far as they have been looked at.
 #[derive(Default)]
-pub struct SiteTexts(Mutex<Texts>);
+pub struct SiteTexts {
+    texts: Mutex<Texts>,
+    /// When they were last asked for, on the clock of `TextBudget`.
+    pub(super) last_use: AtomicU64,
+}
 
 #[derive(Default)]
 struct Texts {
@@ -50,13 +55,29 @@ struct GrowingText {
 }
 
 impl SiteTexts {
+    /// Bytes of the indexes in memory; nothing while they are being worked on.
+    pub fn num_index_bytes(&self) -> usize {
+        self.texts.try_lock().map_or(0, |texts| texts.num_index_bytes())
+    }
+
+    /// Lets go of what was read unless somebody works on it; the bytes that are free then.
+    pub(super) fn let_go(&self) -> usize {
+        let Ok(mut texts) = self.texts.try_lock() else { return 0 };
+        std::mem::take(&mut *texts).num_index_bytes()
+    }
+
+    /// Forgets what was read, since a text has gone.
+    pub async fn forget(&self) {
+        *self.texts.lock().await = Texts::default();
+    }
+
     /// All texts of the serving generation as they stand, indexed.
     pub async fn segments(
         &self,
         store: &Arc<dyn SiteStore>,
         record: &SiteRecord,
     ) -> Result<Vec<Arc<Segment>>, AppError> {
-        let mut texts = self.0.lock().await;
+        let mut texts = self.texts.lock().await;
         if texts.generation != Some(record.generation) {
             *texts = Texts::load(&**store, record.generation).await?;
         }
@@ -74,6 +95,11 @@ impl SiteTexts {
 }
 
 impl Texts {
+    fn num_index_bytes(&self) -> usize {
+        let growing = self.growing.values().filter_map(|text| text.segment.as_ref());
+        self.finished.iter().chain(growing).map(|segment| segment.index.num_bytes()).sum()
+    }
+
     /// The packed texts of a generation as one segment.
     async fn load(store: &dyn SiteStore, generation: Generation) -> Result<Self, AppError> {
         let entries = store.scan(&Key::all_packed_texts(generation), &[], usize::MAX).await?;

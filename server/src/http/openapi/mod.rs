@@ -35,6 +35,7 @@ use node::Node;
         (name = "jobs", description = "Long work: builds of maps"),
         (name = "maps", description = "Maps, their versions and forms, and the matches that hold them together"),
         (name = "localization", description = "Where am I, and where was this recorded"),
+        (name = "keys", description = "Who may do what; for administrators"),
         (name = "operations", description = "Health, readiness, metrics"),
     )
 )]

@@ -7,9 +7,10 @@ use super::node::{Members, Node, node};
 const GUARDED: [&str; 2] = ["/v1/", "/metrics"];
 
 /// Names that stand in paths: what they name, their form and longest length.
-const PATH_PARAMETERS: [(&str, &str, &str, usize); 3] = [
+const PATH_PARAMETERS: [(&str, &str, &str, usize); 4] = [
     ("site", "Name of the site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("run", "Name of the run in its site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
+    ("key", "Name of the key, chosen when it was made", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("id", "Its name, chosen by the server", r"^[0-9]+$", 19),
 ];
 
@@ -19,13 +20,17 @@ const PROBLEMS: [(&str, &str, &str); 13] = [
     ("401", "Unauthorized", "A key is needed"),
     ("403", "Forbidden", "The key does not allow this"),
     ("404", "NotFound", "Nothing of this name exists"),
-    ("408", "RequestTimeout", "The request took longer than the server allows"),
+    ("408", "RequestTimeout", "The body came too slowly, or the request took longer than the server allows"),
     ("409", "Conflict", "The request does not fit what stands"),
     ("410", "Gone", "It is not kept any more"),
     ("413", "PayloadTooLarge", "The body is larger than the server's limit"),
     ("415", "UnsupportedMediaType", "The body's type or encoding is not understood"),
     ("422", "UnprocessableContent", "A value is well formed and invalid; `field` names it"),
-    ("429", "TooManyRequests", "A queue is full; `Retry-After` says when to ask again"),
+    (
+        "429",
+        "TooManyRequests",
+        "A queue is full or a key asks too often; `Retry-After` says when to ask again",
+    ),
     ("500", "InternalServerError", "A fault of the server"),
     ("503", "ServiceUnavailable", "The server or its storage is busy; `Retry-After` says when to ask again"),
 ];
@@ -114,7 +119,7 @@ fn add_refusals(path: &str, method: &str, operation: &mut Node) {
     let has_names = path.contains('{');
     let mut statuses = vec!["408", "500", "503"];
     if is_guarded {
-        statuses.extend(["401", "403"]);
+        statuses.extend(["401", "403", "429"]);
     }
     if has_names {
         statuses.extend(["404", "422"]);

@@ -4,14 +4,15 @@ use axum::Json;
 use axum::extract::State;
 use locution_engine::scan::Scan;
 use serde::{Deserialize, Serialize};
-use utoipa::ToSchema;
+use utoipa::{IntoParams, ToSchema};
 
-use crate::app::runs::NewBatch;
+use super::texts::FrameDto;
+use crate::app::runs::{FrameOf, NewBatch, scans_in};
 use crate::error::ApiError;
-use crate::extract::{BatchSlot, Body, NoParams, Paged, RunName, SiteOf};
+use crate::extract::{Body, Paged, RunName, SiteOf};
 use crate::http::nanoseconds;
 use crate::http::ranges::RangesDto;
-use crate::http::values::{Page, PageParams, PoseDto};
+use crate::http::values::{Page, PageParams, PoseDto, window};
 use crate::records::Receipt;
 use crate::state::AppState;
 
@@ -128,25 +129,44 @@ pub async fn append_batch(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     RunName(name): RunName,
-    BatchSlot(_slot): BatchSlot,
     Body(batch): Body<BatchDto>,
 ) -> Result<Json<ReceiptDto>, ApiError> {
     let receipt = state.app.append_batch(site, &name, batch.try_into()?).await?;
     Ok(Json(receipt.into()))
 }
 
-/// Stored scans, in order.
+/// Which scans to list.
+#[derive(Clone, Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub struct ScanParams {
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
+    /// In whose coordinates the area is; `odom` unless said.
+    #[param(inline)]
+    pub frame: Option<FrameDto>,
+    /// Version of the map, when the frame is `map`; the serving one unless said.
+    pub version: Option<u64>,
+}
+
+/// Stored scans, in order; all of them, or those of a time and an area.
 #[utoipa::path(get, path = "/v1/sites/{site}/runs/{run}/scans", operation_id = "list_scans", tag = "runs",
-    params(PageParams),
+    params(ScanParams, PageParams),
     responses((status = 200, description = "A page of scans", body = Page<StoredScanDto>)))]
 pub async fn list_scans(
     SiteOf(site): SiteOf,
     RunName(name): RunName,
-    Paged(NoParams {}, page): Paged<NoParams>,
+    Paged(params, page): Paged<ScanParams>,
 ) -> Result<Json<Page<StoredScanDto>>, ApiError> {
     let run = site.run(&name).await?;
-    let scans = run.scans(page.first..page.first.saturating_add(page.limit as u64)).await?;
-    let items =
-        (page.first..).zip(scans).map(|(scan_seq, scan)| StoredScanDto::new(scan_seq, scan)).collect();
-    Ok(Json(Page::of(items, page.first, run.head.next_sequence)))
+    let window = window(params.from_ns, params.to_ns, params.area.as_deref())?;
+    let of = FrameOf { frame: params.frame.unwrap_or(FrameDto::Odom).into(), version: params.version };
+    let (scans, next) = scans_in(&site, &run, &window, of, page.first, page.limit).await?;
+    let items = scans.into_iter().map(|(scan_seq, scan)| StoredScanDto::new(scan_seq, scan)).collect();
+    Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }

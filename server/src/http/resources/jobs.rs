@@ -7,7 +7,7 @@ use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::site::JobInfo;
+use crate::app::site::{JobInfo, Site};
 use crate::error::ApiError;
 use crate::extract::{IdOf, NoParams, Paged, Params, SiteOf};
 use crate::http::values::{Page, PageParams};
@@ -27,6 +27,8 @@ pub enum JobStateDto {
     Done,
     /// It did not; `error` says why.
     Failed,
+    /// Somebody ended it before it was done.
+    Cancelled,
 }
 
 /// What a job does.
@@ -50,6 +52,9 @@ pub struct JobDto {
     /// From 0 to 1.
     #[schema(minimum = 0, maximum = 1)]
     pub progress: f64,
+    /// Seconds that it will still take at work, by the time that it has taken so far; null while that cannot be told.
+    #[schema(minimum = 0)]
+    pub left_s: Option<f64>,
     /// What it is at, or what came of it.
     pub detail: String,
     /// Why it failed.
@@ -66,12 +71,14 @@ impl From<JobInfo> for JobDto {
             JobState::Running => JobStateDto::Running,
             JobState::Done => JobStateDto::Done,
             JobState::Failed => JobStateDto::Failed,
+            JobState::Cancelled => JobStateDto::Cancelled,
         };
         Self {
             id: info.record.id.to_string(),
             kind,
             state,
             progress: info.progress,
+            left_s: info.left.map(|left| left.as_secs_f64()),
             detail: info.record.detail,
             error: info.record.error,
         }
@@ -101,10 +108,15 @@ pub async fn build_map(
 ) -> Result<Response, ApiError> {
     let job = state.app.queue_job(&site, JobKind::Build).await?;
     if !params.wait {
-        let location = format!("/v1/sites/{}/jobs/{}", site.name(), job.record.id);
-        return Ok(with_location(&location, (StatusCode::ACCEPTED, Json(JobDto::from(job)))));
+        return Ok(accepted(&site, job));
     }
     Ok(Json(JobDto::from(site.jobs().ended(job.record.id).await?)).into_response())
+}
+
+/// 202 with a job and where to watch it.
+pub fn accepted(site: &Site, job: JobInfo) -> Response {
+    let location = format!("/v1/sites/{}/jobs/{}", site.name(), job.record.id);
+    with_location(&location, (StatusCode::ACCEPTED, Json(JobDto::from(job))))
 }
 
 /// All jobs that are remembered, the newest first.
@@ -125,4 +137,16 @@ pub async fn list_jobs(
     responses((status = 200, description = "The job", body = JobDto)))]
 pub async fn get_job(SiteOf(site): SiteOf, IdOf(id): IdOf) -> Result<Json<JobDto>, ApiError> {
     Ok(Json(site.jobs().get(id)?.into()))
+}
+
+/// Cancel a job. One that waits is over at once, one that runs ends at its next step; one that has ended stays as it is.
+/// What it had made so far is not served.
+#[utoipa::path(delete, path = "/v1/sites/{site}/jobs/{id}", operation_id = "cancel_job", tag = "jobs",
+    responses((status = 200, description = "The job as it ended, or as it stands when that takes longer", body = JobDto)))]
+pub async fn cancel_job(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    IdOf(id): IdOf,
+) -> Result<Json<JobDto>, ApiError> {
+    Ok(Json(state.app.cancel_job(&site, id).await?.into()))
 }

@@ -1,14 +1,18 @@
 //! Labelled places, and questions in their words.
 
-use axum::Json;
+use axum::extract::State;
+use axum::{Extension, Json};
 use locution_engine::semantics::{LabelPattern, PlaceLabel};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::maps::{DrivenStretch, LabelAnswer, find_labels, labels};
+use crate::app::{AppError, Name};
+use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{Body, Paged, SiteOf};
-use crate::http::values::{Page, PageParams, PoseDto};
+use crate::http::values::{Page, PageParams, PoseDto, one_of, window};
+use crate::state::AppState;
 
 /// Most parts of a question.
 const NUM_PARTS_MAX: usize = 16;
@@ -18,6 +22,21 @@ const NUM_PARTS_MAX: usize = 16;
 #[into_params(parameter_in = Query)]
 #[serde(deny_unknown_fields)]
 pub struct LabelParams {
+    /// Name of the run that drove them.
+    #[param(pattern = "^[A-Za-z0-9_-][A-Za-z0-9._-]*$", max_length = 64)]
+    pub run: Option<String>,
+    /// What kind of place.
+    #[param(value_type = Option<PlaceLabelDto>, inline)]
+    pub label: Option<String>,
+    /// Component of the map.
+    pub component: Option<u32>,
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres, in the map; the middle counts.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
     /// Version of the map; the serving one unless said.
     pub version: Option<u64>,
 }
@@ -168,6 +187,8 @@ impl LabelQueryDto {
 /// Where a question fits.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct LabelAnswerDto {
+    /// The site.
+    pub site: String,
     /// The stretches, in the order of the question.
     pub places: Vec<LabelDto>,
     /// Whether the run drove them the other way round.
@@ -176,9 +197,11 @@ pub struct LabelAnswerDto {
     pub confidence: f64,
 }
 
-impl From<LabelAnswer> for LabelAnswerDto {
-    fn from(answer: LabelAnswer) -> Self {
+impl LabelAnswerDto {
+    /// An answer of a site.
+    pub fn new(site: &Name, answer: LabelAnswer) -> Self {
         Self {
+            site: site.to_string(),
             places: answer.stretches.into_iter().map(LabelDto::from).collect(),
             is_reversed: answer.is_reversed,
             confidence: answer.confidence,
@@ -195,7 +218,16 @@ pub async fn list_labels(
     SiteOf(site): SiteOf,
     Paged(params, page): Paged<LabelParams>,
 ) -> Result<Json<Page<LabelDto>>, ApiError> {
-    let labels = labels(&site.map(params.version).await?).await?;
+    let label: Option<PlaceLabelDto> = one_of("label", params.label.as_deref())?;
+    let window = window(params.from_ns, params.to_ns, params.area.as_deref())?;
+    let mut labels = labels(&site.map(params.version).await?).await?;
+    labels.retain(|driven| {
+        params.run.as_ref().is_none_or(|run| *run == driven.run)
+            && params.component.is_none_or(|component| component == driven.component)
+            && label.is_none_or(|label| label == driven.stretch.label.into())
+            && window.holds_time(driven.stretch.timestamps_ns)
+            && window.holds_place(&driven.stretch.map_from_middle.position())
+    });
     let total = labels.len();
     Ok(Json(Page::of_all(labels.into_iter().map(LabelDto::from), total, page)))
 }
@@ -212,5 +244,30 @@ pub async fn query_labels(
     let (patterns, limit) = query.check()?;
     let map = site.map(None).await?;
     let answers = find_labels(&map, &patterns, limit).await?;
-    Ok(Json(answers.into_iter().map(LabelAnswerDto::from).collect()))
+    Ok(Json(answers.into_iter().map(|answer| LabelAnswerDto::new(site.name(), answer)).collect()))
+}
+
+/// The same over all sites that the key may see, the surest first. Sites without a map are passed over.
+#[utoipa::path(post, path = "/v1/queries/labels", operation_id = "query_labels_everywhere", tag = "maps",
+    request_body = LabelQueryDto,
+    responses((status = 200, description = "Where the labels are driven one after the other", body = Vec<LabelAnswerDto>)))]
+pub async fn query_labels_everywhere(
+    State(state): State<AppState>,
+    Extension(identity): Extension<Identity>,
+    Body(query): Body<LabelQueryDto>,
+) -> Result<Json<Vec<LabelAnswerDto>>, ApiError> {
+    let (patterns, limit) = query.check()?;
+    let mut answers = Vec::new();
+    for site in state.app.sites(|name| identity.may_see(name)).await? {
+        let map = match site.map(None).await {
+            Err(AppError::NotReady { .. }) => continue,
+            map => map?,
+        };
+        let found = find_labels(&map, &patterns, limit).await?;
+        answers.extend(found.into_iter().map(|answer| LabelAnswerDto::new(site.name(), answer)));
+        // A site's best come first, so what is cut off here cannot be among the best of all.
+        answers.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+        answers.truncate(limit);
+    }
+    Ok(Json(answers))
 }

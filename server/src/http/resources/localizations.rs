@@ -1,5 +1,7 @@
 //! "Where am I": sessions fed with scans, and questions by example.
 
+use std::sync::Arc;
+
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::Response;
@@ -17,8 +19,8 @@ use crate::app::ask::{ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::error::ApiError;
-use crate::extract::{BatchSlot, Body, IdOf, SiteOf};
-use crate::http::values::{ChannelDto, DirectionDto, PoseDto};
+use crate::extract::{Body, IdOf, NoParams, Paged, SiteOf};
+use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto};
 use crate::http::with_location;
 use crate::state::AppState;
 
@@ -146,6 +148,9 @@ pub struct LocalizationDto {
     pub travel_m: f64,
     /// Likeliest first.
     pub hypotheses: Vec<HypothesisDto>,
+    /// Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+    #[schema(minimum = 0)]
+    pub expires_in_s: f64,
     /// Probability that the robot is not in this map; with those of all places 1.
     #[schema(minimum = 0, maximum = 1)]
     pub probability_elsewhere: f64,
@@ -169,6 +174,7 @@ impl From<LocalizationInfo> for LocalizationDto {
             probability_elsewhere: estimate.probability_elsewhere,
             missing: estimate.missing.into_iter().map(MissingDto::from).collect(),
             prior_agrees: estimate.prior_agrees,
+            expires_in_s: info.expires_in.as_secs_f64(),
         }
     }
 }
@@ -313,13 +319,29 @@ impl ExamplePlaceDto {
 pub async fn open_localization(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
+    Extension(identity): Extension<Identity>,
     Body(new): Body<NewLocalizationDto>,
 ) -> Result<Response, ApiError> {
     let geometry = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
-    let info = state.app.open_localization(&site, geometry, prior).await?;
+    let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
+    let info = state.app.open_localization(&site, geometry, prior, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
+}
+
+/// All localisations that are open in the site, the oldest first. Listing them keeps none of them open.
+#[utoipa::path(get, path = "/v1/sites/{site}/localisations", operation_id = "list_localizations", tag = "localization",
+    params(PageParams),
+    responses((status = 200, description = "A page of localisations", body = Page<LocalizationDto>)))]
+pub async fn list_localizations(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    Paged(NoParams {}, page): Paged<NoParams>,
+) -> Result<Json<Page<LocalizationDto>>, ApiError> {
+    let infos = state.app.localizations(&site).await?;
+    let total = infos.len();
+    Ok(Json(Page::of_all(infos.into_iter().map(LocalizationDto::from), total, page)))
 }
 
 /// The answer as it stands.
@@ -342,7 +364,6 @@ pub async fn localize(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
     IdOf(id): IdOf,
-    BatchSlot(_slot): BatchSlot,
     Body(batch): Body<BatchDto>,
 ) -> Result<Json<LocalizationDto>, ApiError> {
     Ok(Json(state.app.localize(&site, id, batch.try_into()?).await?.into()))
@@ -368,7 +389,6 @@ pub async fn close_localization(
 pub async fn query_example(
     State(state): State<AppState>,
     SiteOf(site): SiteOf,
-    BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<ExampleAnswerDto>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
@@ -384,7 +404,6 @@ pub async fn query_example(
 pub async fn query_example_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
-    BatchSlot(_slot): BatchSlot,
     Body(query): Body<ExampleQueryDto>,
 ) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
     let geometry = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;

@@ -10,11 +10,13 @@ use utoipa::{IntoParams, ToSchema};
 
 use super::maps::VersionParams;
 use crate::app::Name;
-use crate::app::maps::{MatchFilter, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide};
+use crate::app::maps::{
+    MatchFilter, MatchOrder, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide,
+};
 use crate::error::ApiError;
 use crate::extract::{Body, IdOf, Paged, Params, SiteOf};
-use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto, one_of};
-use crate::records::MapRecord;
+use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto, one_of, window};
+use crate::records::{MapRecord, StretchPlace};
 
 /// Which matches to list.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
@@ -33,11 +35,68 @@ pub struct MatchParams {
     /// Name of a run that takes part.
     #[param(pattern = "^[A-Za-z0-9_-][A-Za-z0-9._-]*$", max_length = 64)]
     pub run: Option<String>,
+    /// Component of the map in which one of its stretches lies.
+    pub component: Option<u32>,
+    /// What a person said of the pair of places.
+    #[param(value_type = Option<DecisionFilterDto>, inline)]
+    pub decision: Option<String>,
+    /// Least probability.
+    #[param(minimum = 0, maximum = 1)]
+    pub probability_min: Option<f64>,
+    /// Greatest probability.
+    #[param(minimum = 0, maximum = 1)]
+    pub probability_max: Option<f64>,
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres, in the map; either stretch counts, at its middle.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
+    /// In which order; as the version numbers them unless said.
+    #[param(value_type = Option<MatchOrderDto>, inline)]
+    pub sort: Option<String>,
     /// Version of the map; the serving one unless said.
     pub version: Option<u64>,
 }
 
+/// What a person said of a pair of places, or nothing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum DecisionFilterDto {
+    /// It is not the same place.
+    Veto,
+    /// It is the same place.
+    Confirm,
+    /// Nothing was said.
+    None,
+}
+
+/// In which order matches are listed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MatchOrderDto {
+    /// As the version numbers them.
+    Id,
+    /// The most probable first.
+    Probability,
+    /// The latest revisit first.
+    Time,
+}
+
 impl MatchParams {
+    /// The order, as numbered unless said.
+    ///
+    /// # Errors
+    /// 422 for a word that is none of the choices.
+    pub fn order(&self) -> Result<MatchOrder, ApiError> {
+        Ok(match one_of("sort", self.sort.as_deref())?.unwrap_or(MatchOrderDto::Id) {
+            MatchOrderDto::Id => MatchOrder::Number,
+            MatchOrderDto::Probability => MatchOrder::Probability,
+            MatchOrderDto::Time => MatchOrder::Time,
+        })
+    }
+
     /// The filter, with the run's number already looked up.
     ///
     /// # Errors
@@ -57,7 +116,16 @@ impl MatchParams {
             DirectionDto::Same => Direction::Same,
             DirectionDto::Opposite => Direction::Opposite,
         });
-        Ok(MatchFilter { state, channel, direction, run })
+        let decision = one_of("decision", self.decision.as_deref())?.map(|decision| match decision {
+            DecisionFilterDto::Veto => Some(false),
+            DecisionFilterDto::Confirm => Some(true),
+            DecisionFilterDto::None => None,
+        });
+        let probability = (self.probability_min.is_some() || self.probability_max.is_some())
+            .then(|| (self.probability_min.unwrap_or(0.0), self.probability_max.unwrap_or(1.0)));
+        let window = window(self.from_ns, self.to_ns, self.area.as_deref())?;
+        let component = self.component;
+        Ok(MatchFilter { state, channel, direction, run, component, decision, probability, window })
     }
 }
 
@@ -174,6 +242,14 @@ pub struct IntervalDto {
     pub first: u32,
     /// Last observation, inclusive.
     pub last: u32,
+    /// Timestamp of the first, nanoseconds; null in map versions of earlier programs, as what follows.
+    pub first_timestamp_ns: Option<i64>,
+    /// Timestamp of the last, nanoseconds.
+    pub last_timestamp_ns: Option<i64>,
+    /// Component of the map.
+    pub component: Option<u32>,
+    /// Where it was half way, in the component's frame.
+    pub map_from_middle: Option<PoseDto>,
 }
 
 /// What a person said of a pair of places.
@@ -224,11 +300,16 @@ impl MatchDto {
     /// A match, with the runs by name.
     pub fn new(numbered: NumberedMatch, map: &MapRecord) -> Self {
         let found: &PlaceMatch = &numbered.found;
-        let interval = |interval: &locution_engine::mapping::Interval| IntervalDto {
-            run: map.runs.get(interval.run_idx as usize).map(|run| run.name.clone()).unwrap_or_default(),
-            first: interval.first,
-            last: interval.last,
-        };
+        let interval =
+            |interval: &locution_engine::mapping::Interval, place: Option<StretchPlace>| IntervalDto {
+                run: map.runs.get(interval.run_idx as usize).map(|run| run.name.clone()).unwrap_or_default(),
+                first: interval.first,
+                last: interval.last,
+                first_timestamp_ns: place.map(|place| place.timestamps_ns.0),
+                last_timestamp_ns: place.map(|place| place.timestamps_ns.1),
+                component: place.map(|place| place.component),
+                map_from_middle: place.map(|place| place.map_from_middle.into()),
+            };
         let (state, reason) = match found.state {
             MatchState::Candidate => (MatchStateDto::Candidate, None),
             MatchState::Verified => (MatchStateDto::Verified, None),
@@ -241,8 +322,8 @@ impl MatchDto {
         };
         Self {
             id: numbered.id.to_string(),
-            earlier: interval(&found.earlier),
-            later: interval(&found.later),
+            earlier: interval(&found.earlier, numbered.place.map(|place| place.earlier)),
+            later: interval(&found.later, numbered.place.map(|place| place.later)),
             direction: found.direction.into(),
             channel,
             evidence: (&found.evidence).into(),
@@ -271,7 +352,8 @@ pub async fn list_matches(
         Some(run) => Some(site.run(&Name::new(run, "run")?).await?.idx),
         None => None,
     };
-    let (matches, next) = matches(&map, &params.filter(run)?, page.first, page.limit).await?;
+    let filter = params.filter(run)?;
+    let (matches, next) = matches(&map, &filter, params.order()?, page.first, page.limit).await?;
     let items = matches.into_iter().map(|found| MatchDto::new(found, &map.record)).collect();
     Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }

@@ -4,7 +4,9 @@
 pub(super) mod backups;
 pub(super) mod batches;
 pub(super) mod changes;
+pub(super) mod events;
 pub(super) mod jobs;
+pub(super) mod keys;
 pub(super) mod labels;
 pub(super) mod localizations;
 pub(super) mod maps;

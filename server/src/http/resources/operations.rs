@@ -6,6 +6,7 @@ use axum::response::{Html, Response};
 use crate::error::ApiError;
 use crate::http::text;
 use crate::state::AppState;
+use crate::telemetry;
 
 /// The process is alive.
 #[utoipa::path(get, path = "/healthz", operation_id = "get_health", tag = "operations",
@@ -33,5 +34,5 @@ pub async fn ui() -> Html<&'static str> {
 #[utoipa::path(get, path = "/metrics", operation_id = "get_metrics", tag = "operations",
     responses((status = 200, description = "The metrics", body = String, content_type = "text/plain")))]
 pub async fn metrics(State(state): State<AppState>) -> Response {
-    text(state.metrics.render())
+    text(telemetry::render(&state).await)
 }

@@ -8,6 +8,7 @@ use locution_engine::scan::ScanGeometry;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
+use super::jobs::{JobDto, accepted};
 use crate::app::runs::NewRun;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, RunName, SiteOf};
@@ -174,9 +175,9 @@ pub async fn list_runs(
     SiteOf(site): SiteOf,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<RunDto>>, ApiError> {
-    let runs = site.runs(u32::try_from(page.first).unwrap_or(u32::MAX), page.limit).await?;
+    let (runs, next) = site.runs(u32::try_from(page.first).unwrap_or(u32::MAX), page.limit).await?;
     let items = runs.into_iter().map(RunDto::from).collect();
-    Ok(Json(Page::of(items, page.first, u64::from(site.state().record.num_runs))))
+    Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }
 
 /// One run.
@@ -195,4 +196,21 @@ pub async fn finish_run(
     RunName(name): RunName,
 ) -> Result<Json<RunDto>, ApiError> {
     Ok(Json(state.app.finish_run(site, &name).await?.into()))
+}
+
+/// Forget a run with all its traces. It is unknown and its scans and texts are gone at once; when there is a map, a build is
+/// queued that makes a version without it, and versions that hold it are dropped then.
+#[utoipa::path(delete, path = "/v1/sites/{site}/runs/{run}", operation_id = "delete_run", tag = "runs",
+    responses((status = 202, description = "The run is forgotten, and the job makes the map without it", body = JobDto,
+            headers(("Location" = String, description = "Where the job can be watched"))),
+        (status = 204, description = "Nothing of the run is left")))]
+pub async fn delete_run(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    RunName(name): RunName,
+) -> Result<Response, ApiError> {
+    match state.app.delete_run(&site, &name).await? {
+        Some(job) => Ok(accepted(&site, job)),
+        None => Ok(StatusCode::NO_CONTENT.into_response()),
+    }
 }

@@ -8,14 +8,16 @@ use locution_engine::config::EngineConfig;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
-use crate::app::ListedSite;
+use super::jobs::JobDto;
 use crate::app::site::SiteInfo;
+use crate::app::{AppError, ListedSite};
 use crate::auth::Identity;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, SiteName, SiteOf};
 use crate::http::values::{Page, PageParams};
 use crate::http::with_location;
 use crate::http::wording::plain;
+use crate::records::Retention;
 use crate::state::AppState;
 
 /// Makes a site.
@@ -25,6 +27,91 @@ pub struct NewSiteDto {
     /// The engine's configuration; what is left out keeps its default.
     #[schema(value_type = Option<Object>)]
     pub config: Option<serde_json::Value>,
+}
+
+/// How much of a site is kept; what is left out is kept whole.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RetentionDto {
+    /// Map versions, the serving one included; as the server is configured unless said.
+    #[schema(minimum = 1)]
+    pub num_versions: Option<u32>,
+    /// Runs: finished ones beyond are deleted, the oldest first, when a map is built.
+    #[schema(minimum = 1)]
+    pub num_runs: Option<u32>,
+    /// Scans of all runs together: finished runs are deleted, the oldest first, when a map is built. The latest run stays.
+    #[schema(minimum = 1)]
+    pub num_scans: Option<u64>,
+}
+
+impl From<Retention> for RetentionDto {
+    fn from(retention: Retention) -> Self {
+        let Retention { num_versions, num_runs, num_scans } = retention;
+        Self { num_versions, num_runs, num_scans }
+    }
+}
+
+impl RetentionDto {
+    /// The checked numbers.
+    ///
+    /// # Errors
+    /// 422 for a number of zero.
+    fn check(self) -> Result<Retention, ApiError> {
+        let Self { num_versions, num_runs, num_scans } = self;
+        let numbers = [
+            ("num_versions", num_versions.map(u64::from)),
+            ("num_runs", num_runs.map(u64::from)),
+            ("num_scans", num_scans),
+        ];
+        match numbers.iter().find(|(_, number)| *number == Some(0)) {
+            Some((name, _)) => Err(ApiError::invalid(
+                format!("retention.{name}"),
+                "at least 1 is kept; leave it out to keep all",
+            )),
+            None => Ok(Retention { num_versions, num_runs, num_scans }),
+        }
+    }
+}
+
+/// Changes a site; what is left out stays.
+#[derive(Clone, Debug, Default, Serialize, Deserialize, ToSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SiteChangeDto {
+    /// Members of the engine's configuration that change, as a JSON merge patch (RFC 7396): null sets a member to its
+    /// default. Everything but `translator` can be changed.
+    #[schema(value_type = Option<Object>)]
+    pub config: Option<serde_json::Value>,
+    /// Instead of what stands.
+    pub retention: Option<RetentionDto>,
+}
+
+/// A site after it was changed.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ChangedSiteDto {
+    /// The site.
+    pub site: SiteDto,
+    /// What makes a map accordingly; null when nothing changed or there is no map.
+    pub job: Option<JobDto>,
+}
+
+/// Lays a merge patch over a value.
+fn merge(value: &mut serde_json::Value, patch: serde_json::Value) {
+    use serde_json::Value;
+    let Value::Object(changes) = patch else {
+        *value = patch;
+        return;
+    };
+    if !value.is_object() {
+        *value = Value::Object(serde_json::Map::new());
+    }
+    let Some(members) = value.as_object_mut() else { return };
+    for (name, change) in changes {
+        if change.is_null() {
+            members.remove(&name);
+        } else {
+            merge(members.entry(name).or_insert(Value::Null), change);
+        }
+    }
 }
 
 /// Whether a site can be asked.
@@ -73,6 +160,8 @@ pub struct SiteDto {
     /// The engine's configuration in it, complete.
     #[schema(value_type = Object)]
     pub config: serde_json::Value,
+    /// How much of it is kept.
+    pub retention: RetentionDto,
     /// Runs.
     pub num_runs: u32,
     /// Scans of all runs.
@@ -95,7 +184,7 @@ impl From<&SiteInfo> for SiteSummaryDto {
             site: info.name.to_string(),
             state: SiteStateDto::Serving,
             reason: None,
-            num_runs: info.record.num_runs,
+            num_runs: info.num_runs(),
             num_scans: info.num_scans,
             num_observations: info.num_observations,
             num_words: info.num_words,
@@ -141,6 +230,7 @@ impl From<SiteInfo> for SiteDto {
         Self {
             site: summary.site,
             config: serde_json::to_value(&*info.config).unwrap_or_default(),
+            retention: info.record.retention.into(),
             num_runs: summary.num_runs,
             num_scans: summary.num_scans,
             num_observations: summary.num_observations,
@@ -204,6 +294,28 @@ pub async fn get_site(SiteOf(site): SiteOf) -> Result<Json<SiteDto>, ApiError> {
     Ok(Json(site.info().await?.into()))
 }
 
+/// Change a site's configuration or how much of it is kept. When there is a map, a build is queued that makes it accordingly.
+#[utoipa::path(patch, path = "/v1/sites/{site}", operation_id = "change_site", tag = "sites",
+    request_body = SiteChangeDto,
+    responses((status = 200, description = "The site as it stands now", body = ChangedSiteDto)))]
+pub async fn change_site(
+    State(state): State<AppState>,
+    SiteOf(site): SiteOf,
+    Body(change): Body<SiteChangeDto>,
+) -> Result<Json<ChangedSiteDto>, ApiError> {
+    let config = match change.config {
+        Some(patch) => {
+            let mut config = serde_json::to_value(&*site.state().config).map_err(AppError::internal)?;
+            merge(&mut config, patch);
+            Some(parse_config(config)?)
+        }
+        None => None,
+    };
+    let retention = change.retention.map(RetentionDto::check).transpose()?;
+    let job = state.app.change_site(&site, config, retention).await?;
+    Ok(Json(ChangedSiteDto { site: site.info().await?.into(), job: job.map(JobDto::from) }))
+}
+
 /// Forget a site and everything in it.
 #[utoipa::path(delete, path = "/v1/sites/{site}", operation_id = "delete_site", tag = "sites",
     responses((status = 204, description = "Nothing of the site is left")))]
@@ -213,4 +325,26 @@ pub async fn delete_site(
 ) -> Result<StatusCode, ApiError> {
     state.app.delete_site(&name).await?;
     Ok(StatusCode::NO_CONTENT)
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::*;
+
+    #[test]
+    fn a_patch_changes_what_it_names_as_rfc_7396_says() {
+        for (value, patch, merged) in [
+            (json!({"a": "b"}), json!({"a": "c"}), json!({"a": "c"})),
+            (json!({"a": "b", "b": "c"}), json!({"a": null}), json!({"b": "c"})),
+            (json!({"a": {"b": "c"}}), json!({"a": {"b": "d", "c": null}}), json!({"a": {"b": "d"}})),
+            (json!({"a": [{"b": "c"}]}), json!({"a": [1]}), json!({"a": [1]})),
+            (json!({}), json!({"a": {"bb": {"ccc": null}}}), json!({"a": {"bb": {}}})),
+        ] {
+            let mut value = value;
+            merge(&mut value, patch);
+            assert_eq!(value, merged);
+        }
+    }
 }

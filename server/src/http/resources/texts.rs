@@ -9,11 +9,13 @@ use locution_engine::text::{Observation, Word, WordId};
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
-use crate::app::runs::{Frame, StampedPose, Trajectory, trajectory};
+use crate::app::runs::{Frame, FrameOf, StampedPose, Trajectory, observations_in, trajectory};
+use crate::app::site::Site;
 use crate::error::ApiError;
-use crate::extract::{NoParams, Paged, Params, RunName, SiteOf, WantsText};
+use crate::extract::{Paged, Params, RunName, SiteOf, WantsText};
 use crate::http::text;
-use crate::http::values::{Page, PageParams, PoseDto};
+use crate::http::values::{Page, PageParams, PoseDto, window};
+use crate::records::Run;
 
 /// A density sample.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
@@ -110,6 +112,25 @@ pub fn words_as_text(words: &[Word]) -> String {
     text
 }
 
+/// Which observations to list.
+#[derive(Clone, Debug, Default, Deserialize, IntoParams)]
+#[into_params(parameter_in = Query)]
+#[serde(deny_unknown_fields)]
+pub struct ObservationParams {
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
+    /// In whose coordinates the area is; `run` unless said.
+    #[param(inline)]
+    pub frame: Option<FrameDto>,
+    /// Version of the map, when the frame is `map`; the serving one unless said.
+    pub version: Option<u64>,
+}
+
 /// Which words to answer.
 #[derive(Clone, Debug, Default, Deserialize, IntoParams)]
 #[into_params(parameter_in = Query)]
@@ -155,6 +176,41 @@ pub struct TrajectoryParams {
     pub frame: FrameDto,
     /// Version of the map, when the frame is `map`; the serving one unless said.
     pub version: Option<u64>,
+    /// Not before, nanoseconds.
+    pub from_ns: Option<i64>,
+    /// Before, nanoseconds.
+    pub to_ns: Option<i64>,
+    /// Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+    #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
+    pub area: Option<String>,
+    /// Most poses to answer; all unless said.
+    #[param(minimum = 1)]
+    pub limit: Option<usize>,
+    /// `next_cursor` of the answer before.
+    #[param(minimum = 0)]
+    pub cursor: Option<u64>,
+}
+
+impl TrajectoryParams {
+    /// The poses asked for, and where the next ones begin.
+    ///
+    /// # Errors
+    /// 422 for a window that is none and a limit of zero.
+    async fn poses(&self, site: &Site, run: &Run) -> Result<(Trajectory, Option<u64>), ApiError> {
+        let limit = self.limit.unwrap_or(usize::MAX);
+        if limit == 0 {
+            return Err(ApiError::invalid("limit", "at least 1 pose"));
+        }
+        let window = window(self.from_ns, self.to_ns, self.area.as_deref())?;
+        let mut trajectory = trajectory(site, run, self.frame.into(), self.version).await?;
+        let first = self.cursor.unwrap_or(0);
+        trajectory.poses.retain(|pose| {
+            pose.scan_seq >= first && window.holds(pose.timestamp_ns, &pose.frame_from_robot.position())
+        });
+        let next = trajectory.poses.get(limit).map(|pose| pose.scan_seq);
+        trajectory.poses.truncate(limit);
+        Ok((trajectory, next))
+    }
 }
 
 /// A pose at the time of a scan.
@@ -184,15 +240,10 @@ impl From<&StampedPose> for StampedPoseDto {
 pub struct TrajectoryDto {
     /// Component of the map that the poses belong to; null outside the map frame.
     pub component: Option<u32>,
-    /// One for every scan, in order.
+    /// One for every scan that was asked for, in order.
     pub poses: Vec<StampedPoseDto>,
-}
-
-impl From<Trajectory> for TrajectoryDto {
-    fn from(trajectory: Trajectory) -> Self {
-        let poses = trajectory.poses.iter().map(StampedPoseDto::from).collect();
-        Self { component: trajectory.component, poses }
-    }
+    /// Where the next ones begin, when fewer were wanted than there are; null at the end.
+    pub next_cursor: Option<String>,
 }
 
 /// TUM's format.
@@ -202,17 +253,19 @@ pub fn trajectory_as_tum(poses: &[StampedPose]) -> String {
 
 /// Density samples, in order of travel.
 #[utoipa::path(get, path = "/v1/sites/{site}/runs/{run}/observations", operation_id = "list_observations", tag = "texts",
-    params(PageParams),
+    params(ObservationParams, PageParams),
     responses((status = 200, description = "A page of observations", body = Page<ObservationDto>)))]
 pub async fn list_observations(
     SiteOf(site): SiteOf,
     RunName(name): RunName,
-    Paged(NoParams {}, page): Paged<NoParams>,
+    Paged(params, page): Paged<ObservationParams>,
 ) -> Result<Json<Page<ObservationDto>>, ApiError> {
     let run = site.run(&name).await?;
-    let items = run.observations(page.first, page.limit).await?;
-    let items = (page.first..).zip(items).map(|(number, item)| ObservationDto::new(number, item)).collect();
-    Ok(Json(Page::of(items, page.first, run.text.num_observations)))
+    let window = window(params.from_ns, params.to_ns, params.area.as_deref())?;
+    let of = FrameOf { frame: params.frame.unwrap_or(FrameDto::Run).into(), version: params.version };
+    let (found, next) = observations_in(&site, &run, &window, of, page.first, page.limit).await?;
+    let items = found.into_iter().map(|(number, item)| ObservationDto::new(number, item)).collect();
+    Ok(Json(Page { items, next_cursor: next.map(|next| next.to_string()) }))
 }
 
 /// The text of a run, one level at a time; `Accept: text/plain` gives all words of the level, one a line.
@@ -249,11 +302,13 @@ pub async fn get_trajectory(
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
     let run = site.run(&name).await?;
-    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
+    let (trajectory, next) = params.poses(&site, &run).await?;
     if wants_text {
         return Ok(text(trajectory_as_tum(&trajectory.poses)));
     }
-    Ok(Json(TrajectoryDto::from(trajectory)).into_response())
+    let poses = trajectory.poses.iter().map(StampedPoseDto::from).collect();
+    let next_cursor = next.map(|next| next.to_string());
+    Ok(Json(TrajectoryDto { component: trajectory.component, poses, next_cursor }).into_response())
 }
 
 /// The same in TUM's format, for tools that go by the name.
@@ -267,6 +322,5 @@ pub async fn get_trajectory_tum(
     Params(params): Params<TrajectoryParams>,
 ) -> Result<Response, ApiError> {
     let run = site.run(&name).await?;
-    let trajectory = trajectory(&site, &run, params.frame.into(), params.version).await?;
-    Ok(text(trajectory_as_tum(&trajectory.poses)))
+    Ok(text(trajectory_as_tum(&params.poses(&site, &run).await?.0.poses)))
 }
