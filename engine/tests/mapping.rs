@@ -178,6 +178,20 @@ fn a_veto_within_a_run_is_listed_as_such() {
 }
 
 #[test]
+fn the_order_of_the_runs_does_not_matter() {
+    let (first, second) = two_robots();
+    let one = mapped(&[&first, &second], &[], &mut RegistrationMemo::default());
+    let other = mapped(&[&second, &first], &[], &mut RegistrationMemo::default());
+    assert_eq!((one.num_components, other.num_components), (1, 1));
+    // Each map stands in the frame of the run that was given first; apart from that they are the same.
+    let one_from_other = one.runs[1].map_from_keyframes[0];
+    for (pose, of_other) in one.runs[0].map_from_keyframes.iter().zip(&other.runs[1].map_from_keyframes) {
+        assert!(pose.distance(&one_from_other.compose(of_other)) < 1e-6);
+    }
+    assert!(other.matches.iter().all(|found| found.earlier <= found.later));
+}
+
+#[test]
 fn different_buildings_stay_apart() {
     let here = two_robots().0;
     let route = [(2.0, 2.0), (13.0, 2.0), (14.0, 17.0), (14.0, 3.0), (28.0, 2.0)];

@@ -1,25 +1,26 @@
-//! Candidates from the text: pairs of anchors whose surroundings read alike.
+//! Candidates from the text: pairs of anchors of different runs whose surroundings read alike.
 
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use super::anchors::AnchorSet;
-use super::config::MappingConfig;
-use super::run::RunRecord;
+use rayon::prelude::*;
+
+use super::indices::{AnchorIdx, RunIdx};
+use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::retrieval::{ProfileCandidate, ProfileIndex, RunProfile};
-use crate::text::{Direction, Interval};
+use crate::text::Direction;
 
 /// A pair of anchors that may be the same place, and how they would then lie to each other.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Candidate {
     /// Anchor of the earlier stretch.
-    pub earlier: usize,
+    pub earlier: AnchorIdx,
     /// Anchor of the later stretch.
-    pub later: usize,
+    pub later: AnchorIdx,
     /// The later anchor seen from the earlier one, as the stretches are aligned.
     pub predicted: Pose2,
-    /// What the retrieval said.
+    /// What the retrieval said; its runs are numbered in the site's own order.
     pub profile: ProfileCandidate,
 }
 
@@ -27,41 +28,58 @@ pub(crate) struct Candidate {
 ///
 /// Every two runs are compared on their own: among the runs of many buildings those of other buildings would take the
 /// few places that each window has to give. Of every two runs the best `max_candidates_per_pair` are kept.
-pub(crate) fn candidates_across(
-    runs: &[RunRecord<'_>],
-    set: &AnchorSet,
-    config: &MappingConfig,
-) -> Vec<Candidate> {
-    let spacing_m = config.retrieval.sample_spacing_m;
-    let profiles: Vec<RunProfile> =
-        runs.iter().map(|run| RunProfile::from_observations(run.observations, spacing_m)).collect();
-    let mut found = Vec::new();
-    for later_run in 0..runs.len() {
-        for earlier_run in 0..later_run {
-            let pair = vec![profiles[earlier_run].clone(), profiles[later_run].clone()];
-            let index = ProfileIndex::build(pair, config.retrieval.clone());
-            let across = index.all_candidates(1).into_iter().filter(|found| found.earlier.run_idx == 0);
-            let named = across.filter_map(|mut profile| {
-                profile.earlier.run_idx = earlier_run as u32;
-                profile.later.run_idx = later_run as u32;
-                to_anchors(runs, set, profile)
-            });
-            found.extend(best_of_pair(named, config.max_candidates_per_pair));
-        }
-    }
+pub(crate) fn candidates_across(site: &SiteAnchors<'_>) -> Vec<Candidate> {
+    let spacing_m = site.config.retrieval.sample_spacing_m;
+    let profiles: Vec<RunProfile> = site
+        .runs()
+        .map(|run| RunProfile::from_observations(site.record(run).observations, spacing_m))
+        .collect();
+    let pairs: Vec<(RunIdx, RunIdx)> = site
+        .runs()
+        .flat_map(|later| {
+            site.runs().filter(move |&earlier| earlier < later).map(move |earlier| (earlier, later))
+        })
+        .collect();
+    let of_pair = |&(earlier, later): &(RunIdx, RunIdx)| {
+        let pair = vec![profiles[earlier.at()].clone(), profiles[later.at()].clone()];
+        let index = ProfileIndex::build(pair, site.config.retrieval.clone());
+        let across = index.all_candidates(1).into_iter().filter(|found| found.earlier.run_idx == 0);
+        let named = across.filter_map(|mut profile| {
+            profile.earlier.run_idx = earlier.at() as u32;
+            profile.later.run_idx = later.at() as u32;
+            to_anchors(site, (earlier, later), profile)
+        });
+        best_of_pair(named, site.config.max_candidates_per_pair)
+    };
+    let found: Vec<Vec<Candidate>> = pairs.par_iter().map(of_pair).collect();
+    let mut found: Vec<Candidate> = found.into_iter().flatten().collect();
     found.sort_by_key(Candidate::key);
     found
 }
 
+/// Profile candidates within a run, at most one for a pair of anchors and a direction.
+pub(crate) fn candidates_within(site: &SiteAnchors<'_>, run: RunIdx) -> Vec<Candidate> {
+    let spacing_m = site.config.retrieval.sample_spacing_m;
+    let profile = RunProfile::from_observations(site.record(run).observations, spacing_m);
+    let index = ProfileIndex::build(vec![profile], site.config.retrieval.clone());
+    let named = index.all_candidates(0).into_iter().filter_map(|mut profile| {
+        profile.earlier.run_idx = run.at() as u32;
+        profile.later.run_idx = run.at() as u32;
+        to_anchors(site, (run, run), profile)
+    });
+    best_of_pair(named, site.config.max_candidates_per_pair)
+}
+
 impl Candidate {
-    fn key(&self) -> (usize, usize, Direction) {
+    /// What it is about.
+    pub fn key(&self) -> (AnchorIdx, AnchorIdx, Direction) {
         (self.later, self.earlier, self.profile.direction)
     }
 }
 
 /// The best candidate of every two anchors and direction, and of these the best few.
 fn best_of_pair(candidates: impl Iterator<Item = Candidate>, num_max: usize) -> Vec<Candidate> {
-    let mut best: BTreeMap<(usize, usize, Direction), Candidate> = BTreeMap::new();
+    let mut best: BTreeMap<(AnchorIdx, AnchorIdx, Direction), Candidate> = BTreeMap::new();
     for candidate in candidates {
         let key = candidate.key();
         if best.get(&key).is_none_or(|other| candidate.profile.score > other.profile.score) {
@@ -74,26 +92,20 @@ fn best_of_pair(candidates: impl Iterator<Item = Candidate>, num_max: usize) -> 
     ranked
 }
 
-fn to_anchors(runs: &[RunRecord<'_>], set: &AnchorSet, profile: ProfileCandidate) -> Option<Candidate> {
-    let (earlier, run_from_earlier) = nearest_anchor(runs, set, &profile.earlier)?;
-    let (later, run_from_later) = nearest_anchor(runs, set, &profile.later)?;
+fn to_anchors(
+    site: &SiteAnchors<'_>,
+    (earlier_run, later_run): (RunIdx, RunIdx),
+    profile: ProfileCandidate,
+) -> Option<Candidate> {
+    let (earlier, run_from_earlier) = site.at_middle(earlier_run, &profile.earlier)?;
+    let (later, run_from_later) = site.at_middle(later_run, &profile.later)?;
     let turn = match profile.direction {
         Direction::Same => 0.0,
         Direction::Opposite => PI,
     };
     // The middles of the two stretches are one place; walk from one anchor to it and on to the other anchor.
-    let to_middle = set.anchors[earlier].run_from_anchor.between(&run_from_earlier);
-    let from_middle = run_from_later.between(&set.anchors[later].run_from_anchor);
+    let to_middle = site.anchor(earlier).run_from_anchor.between(&run_from_earlier);
+    let from_middle = run_from_later.between(&site.anchor(later).run_from_anchor);
     let predicted = to_middle.compose(&Pose2::new(0.0, 0.0, turn)).compose(&from_middle);
     Some(Candidate { earlier, later, predicted, profile })
-}
-
-/// The anchor nearest to the middle of an interval, and the pose of that middle in the run's frame.
-fn nearest_anchor(runs: &[RunRecord<'_>], set: &AnchorSet, interval: &Interval) -> Option<(usize, Pose2)> {
-    let run_idx = interval.run_idx as usize;
-    let run = runs.get(run_idx)?;
-    let middle = run.observations.get(((interval.first + interval.last) / 2) as usize)?;
-    let after = run.keyframes.partition_point(|keyframe| keyframe.scan_seq < middle.scan_seq);
-    let travel_m = set.travels_m[run_idx].get(after.min(run.keyframes.len().checked_sub(1)?))?;
-    Some((set.nearest(run_idx, *travel_m)?, middle.run_from_robot))
 }

@@ -1,97 +1,112 @@
-//! From the finished map to matches with their evidence.
+//! From the finished map to matches with their evidence, told of the runs in the order in which they were given.
 
 use std::collections::BTreeMap;
 
-use super::anchors::AnchorSet;
-use super::coarse_graph::{Closure, CoarseGraph};
-use super::config::MappingConfig;
-use super::mapper::Refusal;
+use nalgebra::Matrix3;
+
+use super::coarse_graph::Closure;
+use super::component::Component;
+use super::indices::{AnchorIdx, RunIdx};
 use super::place_match::{Channel, Evidence, MatchState, PlaceMatch, Registration};
+use super::refusals::Refusal;
 use super::run::RunRecord;
+use super::site_anchors::SiteAnchors;
 use super::stretches::Stretch;
 use crate::text::{Direction, Interval, Observation};
 
-/// Closures by their anchors.
-pub(crate) type ClosureIndex<'a> = BTreeMap<(usize, usize), &'a Closure>;
+/// Closures by their anchors, with the component whose graph keeps them.
+pub(crate) struct ClosureIndex<'a> {
+    site: &'a SiteAnchors<'a>,
+    closures: BTreeMap<(AnchorIdx, AnchorIdx), (&'a Closure, &'a Component<'a>)>,
+}
 
-/// The match that a stretch of the map amounts to.
-///
-/// Verified when submaps on both sides were registered and the optimised graph kept the constraint; otherwise the map
-/// says so, but nothing saw it.
-pub(crate) fn spatial_match(
-    stretch: &Stretch,
-    runs: &[RunRecord<'_>],
-    set: &AnchorSet,
-    graph: &CoarseGraph,
-    closures: &ClosureIndex<'_>,
-    config: &MappingConfig,
-) -> PlaceMatch {
-    let around = |interval: &Interval| {
-        let run = interval.run_idx as usize;
-        let middle = &runs[run].observations[((interval.first + interval.last) / 2) as usize];
-        let keyframe = runs[run].keyframes.partition_point(|keyframe| keyframe.scan_seq < middle.scan_seq);
-        let keyframe = keyframe.min(runs[run].keyframes.len().saturating_sub(1));
-        let travel_m = set.travels_m[run].get(keyframe).copied().unwrap_or(0.0);
-        let anchor = set.nearest(run, travel_m).unwrap_or(0);
-        let range = set.of_run(run);
-        anchor.saturating_sub(2).max(range.start)..(anchor + 3).min(range.end)
-    };
-    let (earlier, later) = (around(&stretch.earlier), around(&stretch.later));
-    let mut supporting: Vec<&Closure> = Vec::new();
-    for a in earlier {
-        for b in later.clone() {
-            supporting.extend(closures.get(&(a, b)).copied());
-            supporting.extend(closures.get(&(b, a)).copied());
+impl<'a> ClosureIndex<'a> {
+    /// All closures of a map.
+    pub fn new(site: &'a SiteAnchors<'a>, components: &'a [Component<'a>]) -> Self {
+        let of = |component: &'a Component<'a>| {
+            component
+                .closures
+                .iter()
+                .map(move |closure| ((closure.earlier, closure.later), (closure, component)))
+        };
+        Self { site, closures: components.iter().flat_map(of).collect() }
+    }
+
+    /// The match that a stretch of the map amounts to.
+    ///
+    /// Verified when submaps on both sides were registered and the optimized graph kept the constraint; otherwise the
+    /// map says so, but nothing saw it.
+    pub fn spatial_match(&self, stretch: &Stretch, told: &[RunRecord<'_>]) -> PlaceMatch {
+        let supporting = self.supporting(stretch);
+        let best = supporting.iter().max_by(|a, b| a.0.fit.agreement.total_cmp(&b.0.fit.agreement));
+        let (state, probability) = match best {
+            Some((closure, component)) => {
+                let support = supporting.len() as f64;
+                let doubt = (1.0 - closure.fit.agreement) + 0.01 * component.graph.chi2(closure).min(20.0);
+                (MatchState::Verified, (1.0 - 0.2 * doubt - 0.1 / (1.0 + support)).clamp(0.5, 1.0))
+            }
+            None => (MatchState::Candidate, 0.3),
+        };
+        PlaceMatch {
+            earlier: stretch.earlier,
+            later: stretch.later,
+            direction: stretch.direction,
+            channel: Channel::Spatial,
+            evidence: Evidence {
+                density_correlation: density_correlation(told, stretch),
+                registration: best.map(|(closure, _)| registration_of(self.site, closure)),
+                ..Evidence::default()
+            },
+            probability,
+            state,
         }
     }
-    let best = supporting.iter().copied().max_by(|a, b| a.fit.agreement.total_cmp(&b.fit.agreement));
-    let density_correlation = density_correlation(runs, stretch);
-    let (state, probability) = match best {
-        Some(closure) => {
-            let support = supporting.len() as f64;
-            let doubt = (1.0 - closure.fit.agreement) + 0.01 * graph.chi2(closure, config).min(20.0);
-            (MatchState::Verified, (1.0 - 0.2 * doubt - 0.1 / (1.0 + support)).clamp(0.5, 1.0))
+
+    /// Closures between anchors around the middles of both sides of a stretch.
+    fn supporting(&self, stretch: &Stretch) -> Vec<(&'a Closure, &'a Component<'a>)> {
+        let around = |interval: &Interval| {
+            let run = self.site.run_told(interval.run_idx as usize)?;
+            let (anchor, _) = self.site.at_middle(run, interval)?;
+            let range = self.site.of_run(run);
+            Some(anchor.at().saturating_sub(2).max(range.start)..(anchor.at() + 3).min(range.end))
+        };
+        let (Some(earlier), Some(later)) = (around(&stretch.earlier), around(&stretch.later)) else {
+            return Vec::new();
+        };
+        let mut supporting = Vec::new();
+        for a in earlier.map(AnchorIdx::new) {
+            for b in later.clone().map(AnchorIdx::new) {
+                supporting.extend(self.closures.get(&(a, b)).copied());
+                supporting.extend(self.closures.get(&(b, a)).copied());
+            }
         }
-        None => (MatchState::Candidate, 0.3),
-    };
-    PlaceMatch {
-        earlier: stretch.earlier,
-        later: stretch.later,
-        direction: stretch.direction,
-        channel: Channel::Spatial,
-        evidence: Evidence {
-            density_correlation,
-            registration: best.map(|closure| registration_of(set, closure)),
-            ..Evidence::default()
-        },
-        probability,
-        state,
+        supporting
     }
 }
 
 /// A registration that the map refused, as the match that it would have been.
-pub(crate) fn refused_match(refusal: &Refusal, runs: &[RunRecord<'_>], set: &AnchorSet) -> PlaceMatch {
+pub(crate) fn refused_match(refusal: &Refusal, site: &SiteAnchors<'_>) -> PlaceMatch {
     let closure = &refusal.closure;
-    let around = |anchor: usize| {
-        let anchor = &set.anchors[anchor];
-        let run = &runs[anchor.run_idx as usize];
-        let scan_seq = run.keyframes[anchor.keyframe as usize].scan_seq;
+    let around = |anchor: AnchorIdx| {
+        let run = site.record(site.run_of(anchor));
+        let scan_seq = run.keyframes[site.anchor(anchor).keyframe.at()].scan_seq;
         let last = run.observations.len().saturating_sub(1);
         let middle =
             run.observations.partition_point(|observation| observation.scan_seq < scan_seq).min(last);
         Interval {
-            run_idx: anchor.run_idx,
+            run_idx: site.told(site.run_of(anchor)) as u32,
             first: middle.saturating_sub(REFUSED_HALF_LENGTH) as u32,
             last: (middle + REFUSED_HALF_LENGTH).min(last) as u32,
         }
     };
     let is_same_way = closure.fit.earlier_from_later.theta.cos() >= 0.0;
+    let (first, second) = in_told_order(site, closure);
     PlaceMatch {
-        earlier: around(closure.earlier),
-        later: around(closure.later),
+        earlier: around(first),
+        later: around(second),
         direction: if is_same_way { Direction::Same } else { Direction::Opposite },
         channel: refusal.channel,
-        evidence: Evidence { registration: Some(registration_of(set, closure)), ..Evidence::default() },
+        evidence: Evidence { registration: Some(registration_of(site, closure)), ..Evidence::default() },
         probability: 0.0,
         state: MatchState::Rejected(refusal.reason),
     }
@@ -100,14 +115,34 @@ pub(crate) fn refused_match(refusal: &Refusal, runs: &[RunRecord<'_>], set: &Anc
 /// Observations on either side of an anchor that a refused registration is said to be about: about a metre.
 const REFUSED_HALF_LENGTH: usize = 10;
 
+/// Anchors of a closure, that of the run listed first or of what was driven first before the other.
+fn in_told_order(site: &SiteAnchors<'_>, closure: &Closure) -> (AnchorIdx, AnchorIdx) {
+    let place = |anchor: AnchorIdx| {
+        let run: RunIdx = site.run_of(anchor);
+        (site.told(run), anchor)
+    };
+    let (a, b) = (closure.earlier, closure.later);
+    if place(a) <= place(b) { (a, b) } else { (b, a) }
+}
+
 /// A closure as it is served.
-pub(crate) fn registration_of(set: &AnchorSet, closure: &Closure) -> Registration {
+fn registration_of(site: &SiteAnchors<'_>, closure: &Closure) -> Registration {
+    let (earlier, later) = in_told_order(site, closure);
+    let fit = &closure.fit;
+    let (earlier_from_later, covariance) = if earlier == closure.earlier {
+        (fit.earlier_from_later, fit.covariance)
+    } else {
+        let inverse = fit.earlier_from_later.inverse();
+        let (sin, cos) = fit.earlier_from_later.theta.sin_cos();
+        let by_pose = Matrix3::new(-cos, -sin, inverse.y, sin, -cos, -inverse.x, 0.0, 0.0, -1.0);
+        (inverse, by_pose * fit.covariance * by_pose.transpose())
+    };
     Registration {
-        earlier_keyframe: set.anchors[closure.earlier].keyframe,
-        later_keyframe: set.anchors[closure.later].keyframe,
-        earlier_from_later: closure.fit.earlier_from_later,
-        covariance: closure.fit.covariance.transpose().into(),
-        agreement: closure.fit.agreement,
+        earlier_keyframe: site.anchor(earlier).keyframe.number(),
+        later_keyframe: site.anchor(later).keyframe.number(),
+        earlier_from_later,
+        covariance: covariance.transpose().into(),
+        agreement: fit.agreement,
     }
 }
 

@@ -1,14 +1,12 @@
-//! The graph of anchors: odometry between neighbours, closures between places driven twice.
+//! The graph of anchors of some runs: odometry between neighbors, closures between places driven twice.
 
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
-use super::anchors::AnchorSet;
-use super::config::MappingConfig;
-use super::run::RunRecord;
+use super::indices::{AnchorIdx, RunIdx};
+use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::pose_graph::{
-    CovarianceSolver, InformationMatrix, PoseConstraint, PoseGraph, PoseGraphError, consistent_sets,
-    optimize_robust,
+    CovarianceSolver, InformationMatrix, PoseConstraint, PoseGraph, PoseGraphError, optimize_robust,
 };
 use crate::registration::SubmapFit;
 
@@ -16,155 +14,136 @@ use crate::registration::SubmapFit;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Closure {
     /// Anchor of the earlier submap.
-    pub earlier: usize,
+    pub earlier: AnchorIdx,
     /// Anchor of the later submap.
-    pub later: usize,
+    pub later: AnchorIdx,
     /// How they fit.
     pub fit: SubmapFit,
 }
 
-/// Anchors at their best poses.
+/// The anchors of some runs at their best poses in one frame.
 #[derive(Clone)]
-pub(crate) struct CoarseGraph {
-    /// Odometry between consecutive anchors of a run: index of the first, covariance.
-    odometry: Vec<(usize, Matrix3<f64>)>,
-    /// Poses of all anchors in the frame of their component.
-    pub poses: Vec<Pose2>,
+pub(crate) struct CoarseGraph<'a> {
+    pub site: &'a SiteAnchors<'a>,
+    /// Ascending.
+    runs: Vec<RunIdx>,
+    /// Ascending.
+    members: Vec<AnchorIdx>,
+    /// For each run of the site the node of its first anchor, if it belongs.
+    first_nodes: Vec<Option<usize>>,
     graph: PoseGraph,
 }
 
-impl CoarseGraph {
-    /// Every run on its own, as its odometry says.
-    pub fn new(set: &AnchorSet, runs: &[RunRecord<'_>], config: &MappingConfig) -> Self {
-        let mut odometry = Vec::new();
-        for run_idx in 0..runs.len() {
-            let range = set.of_run(run_idx);
-            for from in range.start..range.end.saturating_sub(1) {
-                odometry.push((from, set.step_covariance(from, runs, config)));
-            }
+impl<'a> CoarseGraph<'a> {
+    /// Runs with the poses that their anchors have; nothing is optimized yet.
+    pub fn new(
+        site: &'a SiteAnchors<'a>,
+        mut runs: Vec<RunIdx>,
+        pose_of: impl Fn(AnchorIdx) -> Pose2,
+    ) -> Result<Self, PoseGraphError> {
+        runs.sort_unstable();
+        let mut members = Vec::new();
+        let mut first_nodes = vec![None; site.runs().len()];
+        for &run in &runs {
+            first_nodes[run.at()] = Some(members.len());
+            members.extend(site.of_run(run).map(AnchorIdx::new));
         }
-        let poses = set.anchors.iter().map(|anchor| anchor.run_from_anchor).collect();
-        Self { odometry, poses, graph: PoseGraph::new() }
+        let mut graph = PoseGraph::new();
+        for &anchor in &members {
+            graph.add_pose(pose_of(anchor))?;
+        }
+        Ok(Self { site, runs, members, first_nodes, graph })
     }
 
-    /// Optimises all poses under these closures; those that contradict the rest lose their weight.
+    /// Its runs, ascending.
+    pub fn runs(&self) -> &[RunIdx] {
+        &self.runs
+    }
+
+    /// Its anchors, ascending.
+    pub fn anchors(&self) -> &[AnchorIdx] {
+        &self.members
+    }
+
+    /// True when it holds the anchor.
+    pub fn holds(&self, anchor: AnchorIdx) -> bool {
+        self.first_nodes[self.site.run_of(anchor).at()].is_some()
+    }
+
+    /// Where an anchor of it lies.
+    pub fn pose(&self, anchor: AnchorIdx) -> Pose2 {
+        self.graph.poses()[self.node(anchor)]
+    }
+
+    /// Anchors of it with their poses.
+    pub fn placed(&self, anchors: &[AnchorIdx]) -> Vec<(AnchorIdx, Pose2)> {
+        anchors.iter().map(|&anchor| (anchor, self.pose(anchor))).collect()
+    }
+
+    /// Node of an anchor of it.
+    pub fn node(&self, anchor: AnchorIdx) -> usize {
+        let run = self.site.run_of(anchor);
+        let first = self.first_nodes[run.at()].expect("only anchors of the graph's runs are asked for");
+        first + anchor.at() - self.site.of_run(run).start
+    }
+
+    /// Optimizes all poses under these closures; those that contradict the rest lose their weight.
     ///
     /// Returns for each closure whether it was kept.
     ///
     /// # Errors
-    /// Whatever the optimiser cannot solve.
-    pub fn optimize(
-        &mut self,
-        set: &AnchorSet,
-        closures: &[Closure],
-        config: &MappingConfig,
-    ) -> Result<Vec<bool>, PoseGraphError> {
-        self.optimize_within(set, closures, &|_| true, config)
-    }
-
-    /// Optimises only the anchors for which `is_in_scope`; nothing but constraints between them counts.
-    ///
-    /// # Errors
-    /// Whatever the optimiser cannot solve.
-    pub fn optimize_within(
-        &mut self,
-        set: &AnchorSet,
-        closures: &[Closure],
-        is_in_scope: &dyn Fn(usize) -> bool,
-        config: &MappingConfig,
-    ) -> Result<Vec<bool>, PoseGraphError> {
-        let mut graph = self.odometry_graph(set, is_in_scope)?;
+    /// Whatever the optimizer cannot solve.
+    pub fn optimize(&mut self, closures: &[Closure]) -> Result<Vec<bool>, PoseGraphError> {
+        let mut graph = PoseGraph::new();
+        for pose in self.graph.poses() {
+            graph.add_pose(*pose)?;
+        }
+        for pair in
+            self.members.windows(2).filter(|pair| self.site.run_of(pair[0]) == self.site.run_of(pair[1]))
+        {
+            let motion = self.site.step(pair[0], pair[1]);
+            let covariance = self.site.step_covariance(pair[0]);
+            graph.add_constraint(constraint(self.node(pair[0]), self.node(pair[1]), motion, covariance))?;
+        }
         let num_odometry = graph.constraints().len();
         for closure in closures {
-            graph.add_doubtful(closure_constraint(closure, &Matrix3::zeros(), config))?;
+            let covariance = self.with_floor(&closure.fit.covariance);
+            let (i, j) = (self.node(closure.earlier), self.node(closure.later));
+            graph.add_doubtful(constraint(i, j, closure.fit.earlier_from_later, &covariance))?;
         }
+        let config = self.site.config;
         let report = optimize_robust(&mut graph, &config.pose_graph, &config.robust)?;
         let is_kept: Vec<bool> = report.inlier_weights.iter().map(|&weight| weight > 0.0).collect();
-        self.poses = graph.poses().to_vec();
         self.graph = graph.with_constraints(|index| is_kept[index]);
         Ok(is_kept[num_odometry..].to_vec())
     }
 
-    /// Takes up the constraints of the whole site again, after optimisations of parts of it.
-    ///
-    /// # Errors
-    /// A closure between anchors that do not exist.
-    pub fn assemble(
-        &mut self,
-        set: &AnchorSet,
-        closures: &[Closure],
-        config: &MappingConfig,
-    ) -> Result<(), PoseGraphError> {
-        let mut graph = self.odometry_graph(set, &|_| true)?;
-        for closure in closures {
-            graph.add_doubtful(closure_constraint(closure, &Matrix3::zeros(), config))?;
-        }
-        self.graph = graph;
-        Ok(())
-    }
-
-    fn odometry_graph(
-        &self,
-        set: &AnchorSet,
-        is_in_scope: &dyn Fn(usize) -> bool,
-    ) -> Result<PoseGraph, PoseGraphError> {
-        let mut graph = PoseGraph::new();
-        for pose in &self.poses {
-            graph.add_pose(*pose)?;
-        }
-        for (from, covariance) in self.odometry.iter().filter(|(from, _)| is_in_scope(*from)) {
-            let motion = set.anchors[*from].run_from_anchor.between(&set.anchors[from + 1].run_from_anchor);
-            graph.add_constraint(constraint(*from, from + 1, motion, covariance))?;
-        }
-        Ok(graph)
-    }
-
-    /// The largest set of closures between two components that agree pair by pair, by index, ascending; `is_in_scope`
-    /// holds for the anchors of the two. Only after [`CoarseGraph::optimize`].
-    ///
-    /// # Errors
-    /// Whatever the graph cannot solve.
-    pub fn consistent(
-        &self,
-        closures: &[Closure],
-        is_in_scope: &dyn Fn(usize) -> bool,
-        config: &MappingConfig,
-    ) -> Result<Vec<usize>, PoseGraphError> {
-        let candidates: Vec<PoseConstraint> =
-            closures.iter().map(|closure| closure_constraint(closure, &slack(), config)).collect();
-        let constraints = self.graph.constraints();
-        let graph = self.graph.with_constraints(|index| is_in_scope(constraints[index].i as usize));
-        let sets = consistent_sets(&graph, &candidates, &config.consistency)?;
-        let largest = sets.into_iter().max_by_key(|set| set.members.len());
-        Ok(largest.map_or(Vec::new(), |set| set.members.iter().map(|&member| member as usize).collect()))
-    }
-
     /// Squared deviations of a closure from the present poses.
-    pub fn chi2(&self, closure: &Closure, config: &MappingConfig) -> f64 {
-        let relative = self.poses[closure.earlier].between(&self.poses[closure.later]);
-        deviation2(&closure.fit.earlier_from_later, &relative, &with_floor(&closure.fit.covariance, config))
+    pub fn chi2(&self, closure: &Closure) -> f64 {
+        let relative = self.pose(closure.earlier).between(&self.pose(closure.later));
+        let covariance = self.with_floor(&closure.fit.covariance);
+        deviation2(&closure.fit.earlier_from_later, &relative, &covariance)
     }
 
-    /// Answers how sure the graph is of relative poses; only after [`CoarseGraph::optimize`].
+    /// Answers how sure the graph is of relative poses, by node; only after [`CoarseGraph::optimize`].
     ///
     /// # Errors
-    /// Whatever the factorisation cannot solve.
+    /// Whatever the factorization cannot solve.
     pub fn covariances(&self) -> Result<CovarianceSolver, PoseGraphError> {
         CovarianceSolver::new(&self.graph)
     }
-}
 
-/// The covariance of a fit, with what registration itself cannot know.
-pub(crate) fn with_floor(covariance: &Matrix3<f64>, config: &MappingConfig) -> Matrix3<f64> {
-    let place = config.fit_floor_m * config.fit_floor_m;
-    let turn = config.fit_floor_rad * config.fit_floor_rad;
-    covariance + Matrix3::from_diagonal(&nalgebra::Vector3::new(place, place, turn))
+    /// The covariance of a fit, with what registration itself cannot know.
+    pub fn with_floor(&self, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+        let place = self.site.config.fit_floor_m.powi(2);
+        let turn = self.site.config.fit_floor_rad.powi(2);
+        covariance + Matrix3::from_diagonal(&Vector3::new(place, place, turn))
+    }
 }
 
 /// Squared Mahalanobis length of the difference of two poses, in the axes of their common frame.
 pub(crate) fn deviation2(a: &Pose2, b: &Pose2, covariance: &Matrix3<f64>) -> f64 {
-    let difference =
-        nalgebra::Vector3::new(b.x - a.x, b.y - a.y, crate::geometry::wrap_angle(b.theta - a.theta));
+    let difference = Vector3::new(b.x - a.x, b.y - a.y, crate::geometry::wrap_angle(b.theta - a.theta));
     covariance
         .try_inverse()
         .map_or(f64::INFINITY, |inverse| (difference.transpose() * inverse * difference)[0])
@@ -172,12 +151,7 @@ pub(crate) fn deviation2(a: &Pose2, b: &Pose2, covariance: &Matrix3<f64>) -> f64
 
 /// What the graph's covariance does not know: submaps are not rigid.
 pub(crate) fn slack() -> Matrix3<f64> {
-    Matrix3::from_diagonal(&nalgebra::Vector3::new(0.1 * 0.1, 0.1 * 0.1, 0.03 * 0.03))
-}
-
-fn closure_constraint(closure: &Closure, doubt: &Matrix3<f64>, config: &MappingConfig) -> PoseConstraint {
-    let covariance = with_floor(&closure.fit.covariance, config) + doubt;
-    constraint(closure.earlier, closure.later, closure.fit.earlier_from_later, &covariance)
+    Matrix3::from_diagonal(&Vector3::new(0.1 * 0.1, 0.1 * 0.1, 0.03 * 0.03))
 }
 
 /// Covariances are given in the axes of the first pose; the graph wants them in those of the measurement.

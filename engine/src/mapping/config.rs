@@ -42,6 +42,8 @@ pub struct MappingConfig {
     pub fit_floor_rad: f64,
     /// Share of opinions that must agree for submaps to fit.
     pub min_agreement: f64,
+    /// Between two runs submaps also fit when this share of the opinions about one of them agrees.
+    pub min_one_way_agreement: f64,
     /// Share of the returns about which the other submap must have an opinion.
     pub min_overlap: f64,
     /// Travel that must lie between two places of one run, metres.
@@ -55,6 +57,8 @@ pub struct MappingConfig {
     pub max_search_m: f64,
     /// Widest search around the predicted heading, radians.
     pub max_search_turn_rad: f64,
+    /// Of all passes beside a place the nearest so many are registered with it.
+    pub max_passes: usize,
     /// Rounds of guided matching at most.
     pub max_rounds: usize,
     /// A registration is refused when its squared deviations from the prediction exceed this.
@@ -67,20 +71,27 @@ pub struct MappingConfig {
     pub min_joining_share: f64,
     /// Largest standard deviation of the place of one run in the other, metres.
     pub max_joining_sd_m: f64,
-    /// Another way to join the same two maps must fit at less than this share of the anchors.
+    /// Another way to join the same two maps counts when it fits at this share of the anchors or more.
     pub max_ambiguity: f64,
     /// Profile candidates of two runs that are registered, the best first.
     pub max_candidates_per_pair: usize,
     /// Anchors whose registrations must agree before a joined map is tried.
     pub min_seeds: usize,
+    /// Groups of candidates that agree, of every two maps, of which some are registered.
+    pub max_ways: usize,
+    /// Candidates of a group that are registered.
+    pub max_probes: usize,
     /// Ways to join two maps that are tried.
     pub max_hypotheses: usize,
     /// Share of the returns of one map that another may contradict where they overlap, in the direction in which it is
     /// less: furniture that came or went shows in one direction only, another building in both.
     pub max_contradiction: f64,
-    /// Two maps may also be joined when they contradict each other, both directions together, no more than this
-    /// multiple of the share in which their own runs contradict themselves.
-    pub max_contradiction_ratio: f64,
+    /// … or this many times the share in which the one of the two that contradicts itself less does so.
+    pub max_contradiction_over_own: f64,
+    /// A wrong way to lay a run over itself forbids a join when it reaches at least this share of the join's length …
+    pub min_reach_over_null: f64,
+    /// … and is contradicted at most this many times as much; so does another way to join the same two.
+    pub null_slack: f64,
 }
 
 impl Default for MappingConfig {
@@ -107,24 +118,30 @@ impl Default for MappingConfig {
             fit_floor_m: 0.02,
             fit_floor_rad: 0.003,
             min_agreement: 0.8,
+            min_one_way_agreement: 0.9,
             min_overlap: 0.25,
             min_gap_m: 10.0,
             beside_m: 1.1,
             neighbor_distance_m: 5.0,
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
+            max_passes: 8,
             max_rounds: 8,
             max_chi2: 16.0,
             min_support: 2,
-            min_joining_anchors: 5,
+            min_joining_anchors: 12,
             min_joining_share: 0.7,
             max_joining_sd_m: 0.2,
             max_ambiguity: 0.7,
             max_candidates_per_pair: 600,
             min_seeds: 2,
-            max_hypotheses: 3,
-            max_contradiction: 0.04,
-            max_contradiction_ratio: 1.4,
+            max_ways: 12,
+            max_probes: 12,
+            max_hypotheses: 5,
+            max_contradiction: 0.045,
+            max_contradiction_over_own: 1.4,
+            min_reach_over_null: 0.7,
+            null_slack: 1.25,
         }
     }
 }

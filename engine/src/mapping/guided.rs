@@ -1,14 +1,17 @@
-//! Guided matching: whatever the graph believes to be neighbours is registered, within the graph's own uncertainty.
+//! Guided matching: whatever the graph believes to be neighbors is registered, within the graph's own uncertainty.
+
+use std::collections::BTreeMap;
 
 use nalgebra::Matrix3;
 
-use super::anchors::AnchorSet;
-use super::coarse_graph::{Closure, CoarseGraph, deviation2, slack, with_floor};
+use super::coarse_graph::{Closure, CoarseGraph, deviation2, slack};
 use super::config::MappingConfig;
+use super::indices::AnchorIdx;
 use super::memo::{RegistrationMemo, Request};
+use super::site_anchors::SiteAnchors;
 use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
-use crate::registration::SearchWindow;
+use crate::registration::{SearchWindow, SubmapFit};
 
 /// A pair of anchors that the graph places near each other.
 #[derive(Clone, Copy, Debug)]
@@ -25,36 +28,44 @@ pub(crate) struct GuidedRound {
     /// Fits that agree with the graph and with each other.
     pub closures: Vec<Closure>,
     /// All pairs of anchors that were registered.
-    pub tried: Vec<(usize, usize)>,
+    pub tried: Vec<(AnchorIdx, AnchorIdx)>,
     /// Fits of submaps that agree, but not with the graph or with the fits around.
     pub refused: Vec<Closure>,
 }
 
-/// Registers all neighbours of one graph that may be matched, and keeps the fits that agree with it and with each other.
+/// True when submaps of two visits agree as far as they overlap.
+///
+/// Between two places of one drive both must agree. Another drive may have been among people, or before the furniture
+/// came: then what the one saw of the other's returns is enough.
+pub(crate) fn is_fit(fit: &SubmapFit, is_one_drive: bool, config: &MappingConfig) -> bool {
+    let agrees = fit.agreement >= config.min_agreement
+        || (!is_one_drive && fit.one_way_agreement >= config.min_one_way_agreement);
+    agrees && fit.overlap >= config.min_overlap
+}
+
+/// Registers all neighbors of one graph that may be matched, and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
 /// Whatever the graph cannot solve; [`MappingError::Stopped`].
-pub(crate) fn guided_closures(
-    set: &AnchorSet,
-    graph: &CoarseGraph,
-    may_match: &impl Fn(usize, usize) -> bool,
-    config: &MappingConfig,
-    memo: &mut RegistrationMemo,
+pub(crate) fn guided_round(
+    graph: &CoarseGraph<'_>,
+    may_match: &impl Fn(AnchorIdx, AnchorIdx) -> bool,
+    memo: &RegistrationMemo,
     span: Span<'_>,
 ) -> Result<GuidedRound, MappingError> {
-    let neighbors = find_neighbors(set, graph, may_match, config, span.part(0, 2))?;
+    let (site, config) = (graph.site, graph.site.config);
+    let neighbors = find_neighbors(graph, may_match, span.part(0, 2))?;
     let requests: Vec<Request> = neighbors.iter().map(|pair| pair.request).collect();
-    let fits = memo.answers(&requests, set, &config.submap, span.part(1, 2))?;
+    let fits = memo.answers(&requests, site, span.part(1, 2))?;
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
     for (pair, fit) in neighbors.iter().zip(fits) {
-        let Some(fit) = fit else { continue };
-        if fit.agreement < config.min_agreement || fit.overlap < config.min_overlap {
-            continue;
-        }
-        let closure = Closure { earlier: pair.request.earlier, later: pair.request.later, fit };
-        let gate = pair.covariance + with_floor(&fit.covariance, config) + slack();
+        let Request { earlier, later, .. } = pair.request;
+        let is_one_drive = site.run_of(earlier) == site.run_of(later);
+        let Some(fit) = fit.filter(|fit| is_fit(fit, is_one_drive, config)) else { continue };
+        let closure = Closure { earlier, later, fit };
+        let gate = pair.covariance + graph.with_floor(&fit.covariance) + slack();
         if deviation2(&pair.predicted, &fit.earlier_from_later, &gate) > config.max_chi2 {
             refused.push(closure);
             continue;
@@ -63,34 +74,37 @@ pub(crate) fn guided_closures(
         uncertain.push(pair.place_sd_m > 0.5);
     }
     let is_supported = |(closure, uncertain): &(&Closure, &bool)| {
-        !**uncertain || support(set, closure, &closures) >= config.min_support
+        !**uncertain || support(site, closure, &closures) >= config.min_support
     };
     let (supported, alone): (Vec<_>, Vec<_>) = closures.iter().zip(&uncertain).partition(is_supported);
     refused.extend(alone.into_iter().map(|(closure, _)| *closure));
-    let supported = supported.into_iter().map(|(closure, _)| *closure).collect();
+    let closures = supported.into_iter().map(|(closure, _)| *closure).collect();
     let tried = requests.iter().map(|request| (request.earlier, request.later)).collect();
-    Ok(GuidedRound { closures: supported, tried, refused })
+    Ok(GuidedRound { closures, tried, refused })
 }
 
 fn find_neighbors(
-    set: &AnchorSet,
-    graph: &CoarseGraph,
-    may_match: &impl Fn(usize, usize) -> bool,
-    config: &MappingConfig,
+    graph: &CoarseGraph<'_>,
+    may_match: &impl Fn(AnchorIdx, AnchorIdx) -> bool,
     span: Span<'_>,
 ) -> Result<Vec<Neighbors>, MappingError> {
-    let reach_m = config.neighbor_distance_m + config.max_search_m;
+    let config = graph.site.config;
     let mut solver = graph.covariances()?;
     let mut found = Vec::new();
-    for later in 0..set.anchors.len() {
-        span.done(later, set.anchors.len())?;
-        let near: Vec<usize> = (0..later)
-            .filter(|&earlier| {
-                may_match(earlier, later) && graph.poses[earlier].distance(&graph.poses[later]) < reach_m
-            })
-            .collect();
-        let near = nearest_of_each_pass(&near, |earlier| graph.poses[earlier].distance(&graph.poses[later]));
-        let relatives = solver.relative_to_many(later as u32, &near)?;
+    let mut nearby = Nearby::new(config.neighbor_distance_m + config.max_search_m);
+    for (idx, &later) in graph.anchors().iter().enumerate() {
+        span.done(idx, graph.anchors().len())?;
+        let here = graph.pose(later);
+        let distance_m = |anchor: AnchorIdx| graph.pose(anchor).distance(&here);
+        let mut near = nearby.around(&here);
+        near.retain(|&earlier| distance_m(earlier) < nearby.reach_m && may_match(earlier, later));
+        nearby.insert(later, &here);
+        let near = nearest_of_each_pass(near, distance_m, config.max_passes);
+        let nodes: Vec<u32> = near.iter().map(|&earlier| graph.node(earlier) as u32).collect();
+        if nodes.is_empty() {
+            continue;
+        }
+        let relatives = solver.relative_to_many(graph.node(later) as u32, &nodes)?;
         for (&earlier, (later_from_earlier, covariance)) in near.iter().zip(relatives) {
             let predicted = later_from_earlier.inverse();
             // The same uncertainty, seen from the earlier anchor; the lever of the heading matters little nearby.
@@ -105,50 +119,83 @@ fn find_neighbors(
                 half_m: (3.0 * place_sd_m + 0.25).min(config.max_search_m),
                 half_turn_rad: (3.0 * turn_sd + 0.05).min(config.max_search_turn_rad),
             };
-            let request = Request { earlier: earlier as usize, later, window };
+            let request = Request { earlier, later, window };
             found.push(Neighbors { request, predicted, covariance, place_sd_m });
         }
     }
     Ok(found)
 }
 
-/// Of every stretch of consecutive anchors the three that are nearest: more would say the same again.
-fn nearest_of_each_pass(anchors: &[usize], distance_m: impl Fn(usize) -> f64) -> Vec<u32> {
-    let mut chosen = Vec::new();
-    for pass in anchors.chunk_by(|a, b| a + 1 == *b) {
-        let mut by_distance: Vec<usize> = pass.to_vec();
-        by_distance.sort_by(|&a, &b| distance_m(a).total_cmp(&distance_m(b)).then(a.cmp(&b)));
-        by_distance.truncate(3);
-        by_distance.sort_unstable();
-        chosen.extend(by_distance.into_iter().map(|anchor| anchor as u32));
+/// Anchors by where they lie, in squares as wide as one looks around.
+struct Nearby {
+    reach_m: f64,
+    squares: BTreeMap<(i64, i64), Vec<AnchorIdx>>,
+}
+
+impl Nearby {
+    fn new(reach_m: f64) -> Self {
+        Self { reach_m, squares: BTreeMap::new() }
     }
+
+    fn square(&self, pose: &Pose2) -> (i64, i64) {
+        ((pose.x / self.reach_m).floor() as i64, (pose.y / self.reach_m).floor() as i64)
+    }
+
+    fn insert(&mut self, anchor: AnchorIdx, pose: &Pose2) {
+        self.squares.entry(self.square(pose)).or_default().push(anchor);
+    }
+
+    /// Whatever may lie within reach, ascending.
+    fn around(&self, pose: &Pose2) -> Vec<AnchorIdx> {
+        let (x, y) = self.square(pose);
+        let around = (y - 1..=y + 1).flat_map(|y| (x - 1..=x + 1).map(move |x| (x, y)));
+        let mut near: Vec<AnchorIdx> =
+            around.filter_map(|square| self.squares.get(&square)).flatten().copied().collect();
+        near.sort_unstable();
+        near
+    }
+}
+
+/// Of every stretch of consecutive anchors the three that are nearest: more would say the same again. Of many stretches
+/// the nearest few: a place that was passed a hundred times is known.
+fn nearest_of_each_pass(
+    anchors: Vec<AnchorIdx>,
+    distance_m: impl Fn(AnchorIdx) -> f64,
+    num_passes_max: usize,
+) -> Vec<AnchorIdx> {
+    let mut passes: Vec<Vec<AnchorIdx>> = anchors
+        .chunk_by(|a, b| a.at() + 1 == b.at())
+        .map(|pass| {
+            let mut by_distance = pass.to_vec();
+            by_distance.sort_by(|&a, &b| distance_m(a).total_cmp(&distance_m(b)).then(a.cmp(&b)));
+            by_distance.truncate(3);
+            by_distance
+        })
+        .collect();
+    passes.sort_by(|a, b| distance_m(a[0]).total_cmp(&distance_m(b[0])).then(a[0].cmp(&b[0])));
+    passes.truncate(num_passes_max);
+    let mut chosen: Vec<AnchorIdx> = passes.into_iter().flatten().collect();
+    chosen.sort_unstable();
     chosen
 }
 
 /// How many other closures nearby along both runs say the same.
-fn support(set: &AnchorSet, closure: &Closure, all: &[Closure]) -> usize {
-    let near = |a: usize, b: usize| {
-        let (a, b) = (&set.anchors[a], &set.anchors[b]);
-        a.run_idx == b.run_idx && (a.travel_m - b.travel_m).abs() <= 8.0
-    };
+fn support(site: &SiteAnchors<'_>, closure: &Closure, all: &[Closure]) -> usize {
+    let near = |a, b| site.are_near_along(a, b, 8.0);
     all.iter()
         .filter(|other| (other.earlier, other.later) != (closure.earlier, closure.later))
         .filter(|other| near(other.earlier, closure.earlier) && near(other.later, closure.later))
-        .filter(|other| agrees(set, closure, other))
+        .filter(|other| agrees(site, closure, other))
         .count()
 }
 
 /// True when going round the loop of two closures and the odometry between them comes back to the start.
-fn agrees(set: &AnchorSet, a: &Closure, b: &Closure) -> bool {
-    let earlier_step = step(set, a.earlier, b.earlier);
-    let later_step = step(set, a.later, b.later);
+fn agrees(site: &SiteAnchors<'_>, a: &Closure, b: &Closure) -> bool {
+    let earlier_step = site.step(a.earlier, b.earlier);
+    let later_step = site.step(a.later, b.later);
     let one_way = a.fit.earlier_from_later.compose(&later_step);
     let other_way = earlier_step.compose(&b.fit.earlier_from_later);
     let error = one_way.between(&other_way);
     let length_m = earlier_step.x.hypot(earlier_step.y) + later_step.x.hypot(later_step.y);
     error.x.hypot(error.y) < 0.3 + 0.03 * length_m && error.theta.abs() < 0.06 + 0.004 * length_m
-}
-
-fn step(set: &AnchorSet, from: usize, to: usize) -> Pose2 {
-    set.anchors[from].run_from_anchor.between(&set.anchors[to].run_from_anchor)
 }

@@ -1,211 +1,267 @@
-//! Joining runs that never met: consistent sets of registrations, extended along both drives, or nothing.
+//! Joining runs that never met, the surest first, as long as one convinces.
 //!
-//! One registration proves little: corridors look alike. But a wrong alignment that fits here contradicts itself some
-//! metres on, where the one corridor turns and the other does not. So a hypothesis is extended to all places where it
-//! lays the two runs over each other, and must hold nearly everywhere, over a long enough drive, in every direction,
-//! and clearly better than any other.
+//! All ways to lay any two components over each other compete; which runs came first plays no part.
 
 use std::cmp::Reverse;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use nalgebra::Matrix2;
+use rayon::prelude::*;
 
-use super::anchors::AnchorSet;
-use super::candidates::Candidate;
-use super::coarse_graph::{Closure, CoarseGraph};
-use super::config::MappingConfig;
-use super::memo::{RegistrationMemo, Request};
-use super::watch::{MappingError, Span};
+use super::candidates::{Candidate, candidates_across};
+use super::coarse_graph::Closure;
+use super::component::{Component, Workshop};
+use super::indices::RunIdx;
+use super::join_evidence::JoinEvidence;
+use super::null::Null;
+use super::place_match::{Channel, PlaceMatch, RejectionReason};
+use super::refusals::{Refusal, unfit_matches};
+use super::watch::MappingError;
+use super::ways::{Groups, Registered, Way};
 use crate::geometry::Pose2;
-use crate::pose_graph::PoseGraphError;
-use crate::registration::SearchWindow;
 
-/// A way to lay one component over another.
-#[derive(Clone, Debug)]
-pub(crate) struct Hypothesis {
-    /// Component that stays.
-    pub host: u32,
-    /// Component that moves.
-    pub guest: u32,
-    /// Frame of the host from frame of the guest.
-    pub host_from_guest: Pose2,
-    /// The registrations that say so.
-    pub closures: Vec<Closure>,
-    /// Number of different anchors of the guest among them.
-    pub num_anchors: usize,
+/// What joining made of the runs.
+pub(crate) struct Joined<'a> {
+    pub components: Vec<Component<'a>>,
+    /// Registrations between runs that the map does not bear out.
+    pub refused: Vec<Refusal>,
+    /// Candidates whose submaps do not fit.
+    pub unfit: Vec<PlaceMatch>,
 }
 
-impl Hypothesis {
-    /// Orders hypotheses: the surest last.
-    pub fn rank(&self) -> (usize, Reverse<u32>, Reverse<u32>) {
-        (self.num_anchors, Reverse(self.host), Reverse(self.guest))
-    }
+/// Two components that might be joined.
+struct Proposal<'c> {
+    host: RunIdx,
+    guest: RunIdx,
+    groups: Groups<'c>,
+}
 
-    /// True when it joins this component to another.
-    pub const fn is_about(&self, component: u32) -> bool {
-        self.host == component || self.guest == component
+impl Proposal<'_> {
+    /// Orders proposals: the surest last.
+    fn rank(&self) -> (usize, Reverse<RunIdx>, Reverse<RunIdx>) {
+        (self.groups.largest(), Reverse(self.host), Reverse(self.guest))
     }
 }
 
-/// Registers the candidates between different components.
+/// Lays components over each other, the surest first, as long as one convinces.
 ///
 /// # Errors
-/// [`MappingError::Stopped`].
-pub(crate) fn registered_candidates(
-    candidates: &[Candidate],
-    set: &AnchorSet,
-    config: &MappingConfig,
-    memo: &mut RegistrationMemo,
-    span: Span<'_>,
-) -> Result<Vec<Option<Closure>>, MappingError> {
-    let requests: Vec<Request> = candidates
-        .iter()
-        .map(|candidate| Request {
-            earlier: candidate.earlier,
-            later: candidate.later,
-            window: SearchWindow { center: candidate.predicted, half_m: 2.0, half_turn_rad: 0.35 },
-        })
+/// Whatever the graph cannot solve; [`MappingError::Stopped`].
+pub(crate) fn join<'a>(
+    alone: Vec<Component<'a>>,
+    workshop: Workshop<'a>,
+) -> Result<Joined<'a>, MappingError> {
+    let candidates: Vec<Candidate> = candidates_across(workshop.site)
+        .into_iter()
+        .filter(|candidate| !workshop.judgements.forbid(candidate.earlier, candidate.later))
         .collect();
-    let fits = memo.answers(&requests, set, &config.submap, span)?;
-    let closures = requests
-        .iter()
-        .zip(fits)
-        .map(|(request, fit)| {
-            fit.filter(|fit| fit.agreement >= config.min_agreement && fit.overlap >= config.min_overlap)
-                .map(|fit| Closure { earlier: request.earlier, later: request.later, fit })
-        })
-        .collect();
-    Ok(closures)
+    let null = Null::of(&alone, workshop.part(0, 3))?;
+    let mut joiner = Joiner::new(alone, &candidates, null, workshop);
+    let mut proposals = joiner.proposals(|_, _| true);
+    let mut num_proposals = proposals.len();
+    while let Some(proposal) = proposals.pop() {
+        let num_left = proposals.len() + 1;
+        num_proposals = num_proposals.max(num_left);
+        let (host, guest) = (proposal.host, proposal.guest);
+        let laying = workshop.part(1, 3).part(num_proposals - num_left, num_proposals);
+        if !joiner.try_join(&proposal, laying)? {
+            continue;
+        }
+        // Every pair that one of the two belongs to is another question now.
+        let is_about_them = |proposal: &Proposal<'_>| {
+            [proposal.host, proposal.guest].iter().any(|run| [host, guest].contains(run))
+        };
+        proposals.retain(|proposal| !is_about_them(proposal));
+        let joined = host.min(guest);
+        proposals.extend(joiner.proposals(|a, b| a == joined || b == joined));
+        proposals.sort_by_key(Proposal::rank);
+    }
+    joiner.finish()
 }
 
-/// The best few hypotheses between every two components that are wanted: sets of registrations that agree pair by
-/// pair, the largest first.
-///
-/// # Errors
-/// Whatever the graph cannot solve.
-pub(crate) fn hypotheses(
-    closures: &[Closure],
-    set: &AnchorSet,
-    graph: &CoarseGraph,
-    components: &[u32],
-    is_wanted: &dyn Fn(u32, u32) -> bool,
-    config: &MappingConfig,
-) -> Result<Vec<Vec<Hypothesis>>, PoseGraphError> {
-    let component = |anchor: usize| components[set.anchors[anchor].run_idx as usize];
-    let mut pairs: BTreeMap<(u32, u32), Vec<Closure>> = BTreeMap::new();
-    for closure in closures {
-        let (a, b) = (component(closure.earlier), component(closure.later));
-        if a != b && is_wanted(a, b) {
-            pairs.entry((a.min(b), a.max(b))).or_default().push(*closure);
+struct Joiner<'a, 'c> {
+    workshop: Workshop<'a>,
+    candidates: &'c [Candidate],
+    null: Null,
+    /// By the first run of each.
+    components: BTreeMap<RunIdx, Component<'a>>,
+    /// Why two components were not joined, by their first runs.
+    refusals: BTreeMap<(RunIdx, RunIdx), RejectionReason>,
+    fits: Vec<Closure>,
+    unfit: BTreeMap<usize, &'c Candidate>,
+    grown: Vec<RunIdx>,
+}
+
+impl<'a, 'c> Joiner<'a, 'c> {
+    fn new(
+        alone: Vec<Component<'a>>,
+        candidates: &'c [Candidate],
+        null: Null,
+        workshop: Workshop<'a>,
+    ) -> Self {
+        let components = alone.into_iter().map(|component| (component.graph.runs()[0], component)).collect();
+        Self {
+            workshop,
+            candidates,
+            null,
+            components,
+            refusals: BTreeMap::new(),
+            fits: Vec::new(),
+            unfit: BTreeMap::new(),
+            grown: Vec::new(),
         }
     }
-    let mut found = Vec::new();
-    for ((host, guest), mut between) in pairs {
-        let mut rivals = Vec::new();
-        while rivals.len() < config.max_hypotheses {
-            let is_in_scope = |anchor: usize| [host, guest].contains(&component(anchor));
-            let members = graph.consistent(&between, &is_in_scope, config)?;
-            let is_member = |index: usize| members.binary_search(&index).is_ok();
-            let agreeing: Vec<Closure> = members.iter().map(|&index| between[index]).collect();
-            let Some(hypothesis) = hypothesis(agreeing, graph, component, (host, guest)) else { break };
-            if hypothesis.num_anchors < config.min_seeds {
-                break;
+
+    /// Ways to join every two components that are wanted, the surest last.
+    fn proposals(&self, is_wanted: impl Fn(RunIdx, RunIdx) -> bool + Sync) -> Vec<Proposal<'c>> {
+        let firsts: Vec<RunIdx> = self.components.keys().copied().collect();
+        let pairs: Vec<(RunIdx, RunIdx)> = (firsts.iter())
+            .flat_map(|&host| {
+                firsts.iter().filter(move |&&guest| host < guest).map(move |&guest| (host, guest))
+            })
+            .filter(|&(host, guest)| is_wanted(host, guest))
+            .collect();
+        let proposal = |&(host, guest): &(RunIdx, RunIdx)| {
+            let groups = Groups::new(&self.components[&host], &self.components[&guest], self.candidates);
+            Proposal { host, guest, groups }
+        };
+        let mut found: Vec<Proposal<'c>> = pairs.par_iter().map(proposal).collect();
+        found.retain(|proposal| proposal.groups.largest() >= self.workshop.site.config.min_seeds);
+        found.sort_by_key(Proposal::rank);
+        found
+    }
+
+    /// Joins two components if one of the ways to do so holds and no other holds nearly as well; otherwise everything
+    /// stays as it was.
+    fn try_join(&mut self, proposal: &Proposal<'c>, workshop: Workshop<'a>) -> Result<bool, MappingError> {
+        let (host, guest) = (&self.components[&proposal.host], &self.components[&proposal.guest]);
+        let registered = proposal.groups.ways(workshop.part(0, 2))?;
+        let verdict = judged(&registered.ways, host, guest, &self.null, workshop.part(1, 2))?;
+        let Registered { fits, unfit, .. } = registered;
+        self.fits.extend(fits);
+        self.unfit.extend(unfit.into_iter().map(|candidate| {
+            let place = self.candidates.partition_point(|other| other.key() < candidate.key());
+            (place, candidate)
+        }));
+        match verdict {
+            Verdict::Joined(both) => {
+                self.components.remove(&proposal.guest);
+                self.components.insert(proposal.host, *both);
+                self.grown.retain(|run| *run != proposal.guest && *run != proposal.host);
+                self.grown.push(proposal.host);
+                self.refusals.retain(|(a, b), _| {
+                    ![a, b].iter().any(|run| **run == proposal.host || **run == proposal.guest)
+                });
+                Ok(true)
             }
-            rivals.push(hypothesis);
-            let left = between.iter().enumerate().filter(|(index, _)| !is_member(*index));
-            between = left.map(|(_, closure)| *closure).collect();
-        }
-        if !rivals.is_empty() {
-            found.push(rivals);
+            Verdict::Apart(reason) => {
+                self.refusals.insert((proposal.host, proposal.guest), reason);
+                Ok(false)
+            }
         }
     }
-    Ok(found)
+
+    /// Settles what has grown, and lists the registrations between runs that the finished map does not bear out.
+    fn finish(mut self) -> Result<Joined<'a>, MappingError> {
+        for run in &self.grown {
+            if let Some(component) = self.components.get_mut(run) {
+                component.settle(self.workshop.part(2, 3))?;
+            }
+        }
+        let first_of = |closure: &Closure| {
+            let of = |anchor| {
+                self.components
+                    .iter()
+                    .find(|(_, component)| component.graph.holds(anchor))
+                    .map(|(run, _)| *run)
+            };
+            (of(closure.earlier), of(closure.later))
+        };
+        self.fits.sort_by_key(|closure| (closure.later, closure.earlier));
+        self.fits.dedup_by_key(|closure| (closure.later, closure.earlier));
+        let refusal = |closure: &Closure| {
+            let (Some(a), Some(b)) = first_of(closure) else { return None };
+            let is_refused =
+                a != b || self.components[&a].graph.chi2(closure) > self.workshop.site.config.max_chi2;
+            let pair = (a.min(b), a.max(b));
+            let reason = self.refusals.get(&pair).copied().unwrap_or(RejectionReason::Inconsistent);
+            is_refused.then_some(Refusal { channel: Channel::Profile, closure: *closure, reason })
+        };
+        let refused = self.fits.iter().filter_map(refusal).collect();
+        let unfit = unfit_matches(self.unfit.values().copied(), self.workshop.site);
+        Ok(Joined { components: self.components.into_values().collect(), refused, unfit })
+    }
 }
 
-/// How closures that agree lay the guest over the host: as the surest of them says.
-fn hypothesis(
-    closures: Vec<Closure>,
-    graph: &CoarseGraph,
-    component: impl Fn(usize) -> u32,
-    (host, guest): (u32, u32),
-) -> Option<Hypothesis> {
-    let ends = |closure: &Closure| match component(closure.earlier) == host {
-        true => (closure.earlier, closure.later, closure.fit.earlier_from_later),
-        false => (closure.later, closure.earlier, closure.fit.earlier_from_later.inverse()),
+/// What became of a proposal.
+enum Verdict<'a> {
+    Joined(Box<Component<'a>>),
+    Apart(RejectionReason),
+}
+
+/// Tries the ways to lay a guest over a host against each other.
+fn judged<'a>(
+    ways: &[Way],
+    host: &Component<'a>,
+    guest: &Component<'a>,
+    null: &Null,
+    workshop: Workshop<'a>,
+) -> Result<Verdict<'a>, MappingError> {
+    let config = workshop.site.config;
+    let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
+    for (idx, way) in different(ways, guest).into_iter().take(config.max_hypotheses).enumerate() {
+        let found = Component::laid_over(host, guest, way, workshop.part(idx, config.max_hypotheses))?;
+        laid.extend(found.map(|(both, evidence)| (evidence, both)));
+    }
+    let (mut holding, others): (Vec<_>, Vec<_>) =
+        laid.into_iter().partition(|(evidence, _)| evidence.holds(config));
+    holding.sort_by(|(a, _), (b, _)| a.one_sided_contradiction.total_cmp(&b.one_sided_contradiction));
+    let longest = holding.iter().map(|(evidence, _)| evidence.num_anchors).max().unwrap_or_default();
+    let reaches = |evidence: &JoinEvidence, least: usize| {
+        evidence.num_anchors as f64 >= config.max_ambiguity * least as f64
     };
-    let doubt = |closure: &Closure| closure.fit.covariance.fixed_view::<2, 2>(0, 0).trace();
-    let surest = closures.iter().min_by(|a, b| doubt(a).total_cmp(&doubt(b)))?;
-    let (host_anchor, guest_anchor, relative) = ends(surest);
-    let host_from_anchor = graph.poses[host_anchor].compose(&relative);
-    let host_from_guest = host_from_anchor.compose(&graph.poses[guest_anchor].inverse());
-    let hosts: BTreeSet<usize> = closures.iter().map(|closure| ends(closure).0).collect();
-    let guests: BTreeSet<usize> = closures.iter().map(|closure| ends(closure).1).collect();
-    Some(Hypothesis { host, guest, host_from_guest, closures, num_anchors: hosts.len().min(guests.len()) })
+    // A short stretch of corridor is contradicted by little.
+    let Some(place) = holding.iter().position(|(evidence, _)| reaches(evidence, longest)) else {
+        return Ok(Verdict::Apart(RejectionReason::Inconsistent));
+    };
+    let (best, both) = holding.swap_remove(place);
+    if best.is_vetoed {
+        return Ok(Verdict::Apart(RejectionReason::Vetoed));
+    }
+    let is_rival = |(other, rival): &(JoinEvidence, Component<'a>)| {
+        reaches(other, best.num_anchors)
+            && other.one_sided_contradiction <= config.null_slack * best.one_sided_contradiction
+            && differ(&both, rival, host, guest)
+    };
+    if null.explains(&best, config) || holding.iter().chain(&others).any(is_rival) {
+        return Ok(Verdict::Apart(RejectionReason::Ambiguous));
+    }
+    Ok(Verdict::Joined(Box::new(both)))
 }
 
-/// How well a joined map holds between host and guest.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct JoinReport {
-    /// Different anchors of the guest that fit.
-    pub num_anchors: usize,
-    /// Share of the tried guest anchors that fit anywhere.
-    pub share: f64,
-    /// Standard deviation of the worst direction, metres.
-    pub worst_sd_m: f64,
-    /// Share of the returns of the two that contradict each other wherever they overlap.
-    pub contradiction: f64,
-    /// The share that the one contradicts of what the other saw, whichever way is less: furniture that came or went
-    /// counts only one way.
-    pub one_sided_contradiction: f64,
-    /// Contradiction between places of one run, the worse of the two maps.
-    pub own_contradiction: f64,
-    /// True when the joined map brings together what a person said are different places.
-    pub is_vetoed: bool,
+/// Ways that put the guest at different places; of those that put it at one place the first.
+fn different<'w>(ways: &'w [Way], guest: &Component<'_>) -> Vec<&'w Way> {
+    let anchors = guest.graph.anchors();
+    let Some(&middle) = anchors.get(anchors.len() / 2) else { return Vec::new() };
+    let place = |way: &Way| way.host_from_guest.compose(&guest.graph.pose(middle));
+    let mut chosen: Vec<&Way> = Vec::new();
+    for way in ways {
+        if chosen.iter().all(|other| are_apart(&place(other).between(&place(way)))) {
+            chosen.push(way);
+        }
+    }
+    chosen
 }
 
-impl JoinReport {
-    /// True when the joined map may stand.
-    pub fn holds(&self, config: &MappingConfig) -> bool {
-        self.num_anchors >= config.min_joining_anchors
-            && self.share >= config.min_joining_share
-            && self.worst_sd_m <= config.max_joining_sd_m
-            && (self.one_sided_contradiction <= config.max_contradiction
-                || self.contradiction <= config.max_contradiction_ratio * self.own_contradiction)
-    }
+/// True when two poses that differ by this are different places.
+fn are_apart(difference: &Pose2) -> bool {
+    difference.x.hypot(difference.y) > 1.0 || difference.theta.abs() > 0.2
 }
 
-/// Judges a tentatively joined map by its closures and all pairs that were tried.
-pub(crate) fn judge_join(
-    closures: &[Closure],
-    tried: &[(usize, usize)],
-    set: &AnchorSet,
-    graph: &CoarseGraph,
-    is_across: impl Fn(usize, usize) -> bool,
-    guest_anchor: impl Fn(usize, usize) -> usize,
-) -> JoinReport {
-    let fitting: Vec<&Closure> =
-        closures.iter().filter(|closure| is_across(closure.earlier, closure.later)).collect();
-    let anchors: BTreeSet<usize> =
-        fitting.iter().map(|closure| guest_anchor(closure.earlier, closure.later)).collect();
-    let tried: BTreeSet<usize> = tried
-        .iter()
-        .filter(|(a, b)| is_across(*a, *b) && graph.poses[*a].distance(&graph.poses[*b]) < 2.0)
-        .map(|(a, b)| guest_anchor(*a, *b))
-        .collect();
-    let confirmed = tried.intersection(&anchors).count();
-    let mut information = Matrix2::zeros();
-    for closure in &fitting {
-        let in_map =
-            crate::registration::rotated(&closure.fit.covariance, graph.poses[closure.earlier].theta);
-        let place = in_map.fixed_view::<2, 2>(0, 0).into_owned() + Matrix2::identity() * 0.01;
-        information += place.try_inverse().unwrap_or_else(Matrix2::zeros);
-    }
-    let weakest = information.symmetric_eigenvalues().min();
-    debug_assert!(anchors.iter().all(|&anchor| anchor < set.anchors.len()));
-    JoinReport {
-        num_anchors: anchors.len(),
-        share: confirmed as f64 / tried.len().max(1) as f64,
-        worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
-        ..JoinReport::default()
-    }
+/// True when two joined maps put the guest at different places.
+fn differ(a: &Component<'_>, b: &Component<'_>, host: &Component<'_>, guest: &Component<'_>) -> bool {
+    let (Some(&host), Some(&guest)) = (host.graph.anchors().first(), guest.graph.anchors().first()) else {
+        return false;
+    };
+    let relative = |both: &Component<'_>| both.graph.pose(host).between(&both.graph.pose(guest));
+    are_apart(&relative(a).between(&relative(b)))
 }

@@ -5,10 +5,10 @@
 
 use std::ops::Range;
 
-use super::anchors::AnchorSet;
+use super::coarse_graph::CoarseGraph;
+use super::indices::AnchorIdx;
 use super::place_match::{Decision, MatchState, PlaceMatch, RejectionReason};
-use super::run::RunRecord;
-use crate::geometry::Pose2;
+use super::site_anchors::SiteAnchors;
 use crate::text::Interval;
 
 /// Decisions in terms of anchors.
@@ -25,14 +25,14 @@ struct Veto {
 
 impl<'a> Judgements<'a> {
     /// Finds the anchors whose submaps reach into the stretches of each veto.
-    pub fn new(decisions: &'a [Decision], runs: &[RunRecord<'_>], set: &AnchorSet, reach_m: f64) -> Self {
+    pub fn new(decisions: &'a [Decision], site: &SiteAnchors<'_>) -> Self {
         let vetoes = decisions
             .iter()
             .filter(|decision| !decision.is_same_place)
             .filter_map(|decision| {
                 Some(Veto {
-                    earlier: anchors_at(&decision.earlier, runs, set, reach_m)?,
-                    later: anchors_at(&decision.later, runs, set, reach_m)?,
+                    earlier: anchors_at(&decision.earlier, site)?,
+                    later: anchors_at(&decision.later, site)?,
                 })
             })
             .collect();
@@ -40,20 +40,27 @@ impl<'a> Judgements<'a> {
     }
 
     /// True when a person said that these two anchors are different places.
-    pub fn forbid(&self, a: usize, b: usize) -> bool {
+    pub fn forbid(&self, a: AnchorIdx, b: AnchorIdx) -> bool {
+        let (a, b) = (a.at(), b.at());
         self.vetoes.iter().any(|veto| {
             (veto.earlier.contains(&a) && veto.later.contains(&b))
                 || (veto.earlier.contains(&b) && veto.later.contains(&a))
         })
     }
 
-    /// True when these poses lay two places over each other, one for which `is_guest` and one for which it is not,
-    /// that a person said are different.
-    pub fn contradict(&self, poses: &[Pose2], near_m: f64, is_guest: impl Fn(usize) -> bool) -> bool {
+    /// True when a graph lays two places over each other, one for which `is_guest` and one for which it is not, that a
+    /// person said are different.
+    pub fn contradict(
+        &self,
+        graph: &CoarseGraph<'_>,
+        near_m: f64,
+        is_guest: impl Fn(AnchorIdx) -> bool,
+    ) -> bool {
         self.vetoes.iter().any(|veto| {
-            let is_across = is_guest(veto.earlier.start) != is_guest(veto.later.start);
-            let middle = |range: &Range<usize>| &poses[(range.start + range.end - 1) / 2];
-            is_across && middle(&veto.earlier).distance(middle(&veto.later)) <= near_m
+            let middle = |range: &Range<usize>| AnchorIdx::new((range.start + range.end - 1) / 2);
+            let (a, b) = (middle(&veto.earlier), middle(&veto.later));
+            let is_across = graph.holds(a) && graph.holds(b) && is_guest(a) != is_guest(b);
+            is_across && graph.pose(a).distance(&graph.pose(b)) <= near_m
         })
     }
 
@@ -68,24 +75,14 @@ impl<'a> Judgements<'a> {
     }
 }
 
-/// Anchors within `reach_m` of travel of an interval; none when the run does not hold it.
-fn anchors_at(
-    interval: &Interval,
-    runs: &[RunRecord<'_>],
-    set: &AnchorSet,
-    reach_m: f64,
-) -> Option<Range<usize>> {
-    let run_idx = interval.run_idx as usize;
-    let run = runs.get(run_idx)?;
-    let travel_at = |observation: u32| {
-        let scan_seq = run.observations.get(observation as usize)?.scan_seq;
-        let after = run.keyframes.partition_point(|keyframe| keyframe.scan_seq < scan_seq);
-        set.travels_m[run_idx].get(after.min(run.keyframes.len().checked_sub(1)?)).copied()
-    };
-    let (first_m, last_m) = (travel_at(interval.first)? - reach_m, travel_at(interval.last)? + reach_m);
-    let range = set.of_run(run_idx);
-    let anchors = &set.anchors[range.clone()];
-    let start = range.start + anchors.partition_point(|anchor| anchor.travel_m < first_m);
-    let end = range.start + anchors.partition_point(|anchor| anchor.travel_m <= last_m);
+/// Anchors whose submaps reach into an interval; none when the run does not hold it.
+fn anchors_at(interval: &Interval, site: &SiteAnchors<'_>) -> Option<Range<usize>> {
+    let run = site.run_told(interval.run_idx as usize)?;
+    let reach_m = site.config.submap_half_length_m;
+    let (first_m, last_m) = (site.travel_at(run, interval.first)?, site.travel_at(run, interval.last)?);
+    let is_before = |index: &usize, travel_m: f64| site.anchor(AnchorIdx::new(*index)).travel_m < travel_m;
+    let range = site.of_run(run);
+    let start = range.clone().find(|index| !is_before(index, first_m - reach_m))?;
+    let end = range.clone().find(|index| !is_before(index, last_m + reach_m)).unwrap_or(range.end);
     (start < end).then_some(start..end)
 }

@@ -2,11 +2,13 @@
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::anchors::AnchorSet;
+use super::indices::AnchorIdx;
+use super::site_anchors::SiteAnchors;
 use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
 use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
@@ -15,9 +17,9 @@ use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Request {
     /// Anchor of the earlier submap.
-    pub earlier: usize,
+    pub earlier: AnchorIdx,
     /// Anchor of the later submap.
-    pub later: usize,
+    pub later: AnchorIdx,
     /// Where to search.
     pub window: SearchWindow,
 }
@@ -25,27 +27,27 @@ pub(crate) struct Request {
 type Key = (u64, u64, [i32; 5]);
 
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+#[derive(Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
-    fits: HashMap<Key, Option<SubmapFit>>,
+    fits: Mutex<HashMap<Key, Option<SubmapFit>>>,
     config: Option<SubmapConfig>,
 }
 
 impl RegistrationMemo {
     /// Number of remembered registrations.
     pub fn len(&self) -> usize {
-        self.fits.len()
+        self.fits.lock().unwrap_or_else(PoisonError::into_inner).len()
     }
 
     /// True when nothing is remembered.
     pub fn is_empty(&self) -> bool {
-        self.fits.is_empty()
+        self.len() == 0
     }
 
     /// Forgets everything when the settings are others than before.
     pub(crate) fn prepare(&mut self, config: &SubmapConfig) {
         if self.config.as_ref() != Some(config) {
-            self.fits.clear();
+            self.fits.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
             self.config = Some(config.clone());
         }
     }
@@ -57,15 +59,16 @@ impl RegistrationMemo {
     /// # Errors
     /// [`MappingError::Stopped`]; what was computed before is remembered.
     pub(crate) fn answers(
-        &mut self,
+        &self,
         requests: &[Request],
-        set: &AnchorSet,
-        config: &SubmapConfig,
+        site: &SiteAnchors<'_>,
         span: Span<'_>,
     ) -> Result<Vec<Option<SubmapFit>>, MappingError> {
-        let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, set)).collect();
-        let mut missing: Vec<(Key, Request)> =
-            keyed.iter().filter(|(key, _)| !self.fits.contains_key(key)).copied().collect();
+        let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, site)).collect();
+        let mut missing: Vec<(Key, Request)> = {
+            let fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+            keyed.iter().filter(|(key, _)| !fits.contains_key(key)).copied().collect()
+        };
         missing.sort_by_key(|(key, _)| *key);
         missing.dedup_by_key(|(key, _)| *key);
         let num_done = AtomicUsize::new(0);
@@ -73,13 +76,14 @@ impl RegistrationMemo {
             .par_iter()
             .filter_map(|(key, request)| {
                 span.done(num_done.fetch_add(1, Ordering::Relaxed), missing.len()).ok()?;
-                let (earlier, later) = (&set.submaps[request.earlier], &set.submaps[request.later]);
-                Some((*key, register(earlier, later, &request.window, config)))
+                let (earlier, later) = (site.submap(request.earlier), site.submap(request.later));
+                Some((*key, register(earlier, later, &request.window, &site.config.submap)))
             })
             .collect();
-        self.fits.extend(computed);
+        let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+        fits.extend(computed);
         span.done(1, 1)?;
-        Ok(keyed.iter().map(|(key, _)| self.fits.get(key).copied().flatten()).collect())
+        Ok(keyed.iter().map(|(key, _)| fits.get(key).copied().flatten()).collect())
     }
 }
 
@@ -87,7 +91,7 @@ impl RegistrationMemo {
 const GRAIN_M: f64 = 0.25;
 const GRAIN_RAD: f64 = 0.05;
 
-fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
+fn key_of(request: &Request, site: &SiteAnchors<'_>) -> (Key, Request) {
     let window = &request.window;
     let grains = [
         (window.center.x / GRAIN_M).round() as i32,
@@ -106,6 +110,7 @@ fn key_of(request: &Request, set: &AnchorSet) -> (Key, Request) {
         half_m: f64::from(grains[3]) * GRAIN_M,
         half_turn_rad: f64::from(grains[4]) * GRAIN_RAD,
     };
-    let key = (set.anchors[request.earlier].fingerprint, set.anchors[request.later].fingerprint, grains);
+    let name = |anchor| site.anchor(anchor).fingerprint;
+    let key = (name(request.earlier), name(request.later), grains);
     (key, Request { window, ..*request })
 }

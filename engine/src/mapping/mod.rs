@@ -1,25 +1,31 @@
 //! From runs to one map: matches, constraints, the robust pose graph and what is served of it (SPEC section 2).
 
-mod anchors;
 mod candidates;
 mod changes;
 mod claims;
 mod coarse_graph;
+mod component;
 mod config;
+mod finish;
 mod guided;
+mod indices;
+mod join_evidence;
 mod joining;
 mod judgements;
 mod mapper;
 mod memo;
+mod null;
 mod overlap;
 mod place_match;
 mod placement;
-mod refused;
+mod refusals;
 mod run;
+mod site_anchors;
 mod site_map;
 mod stretches;
 mod text_evidence;
 mod watch;
+mod ways;
 
 pub use changes::{Change, ChangeKind, ChangesConfig, PlacedRun, find_changes};
 pub use config::MappingConfig;

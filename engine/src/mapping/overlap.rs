@@ -5,7 +5,8 @@
 //! saw is compared as it lies, nothing is moved. How much contradiction a true overlap brings depends on the place:
 //! people, doors and glass make a run contradict itself, and that is what a join is measured by.
 
-use super::anchors::AnchorSet;
+use super::indices::AnchorIdx;
+use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::registration::Opinions;
 
@@ -14,35 +15,36 @@ const REACH_M: f64 = 6.0;
 /// Submaps of the host compared with one of the guest.
 const MAX_HOSTS: usize = 4;
 
-/// Compares every guest anchor with the host anchors nearest to it, at these poses.
-pub(crate) fn overlap(set: &AnchorSet, poses: &[Pose2], guests: &[usize], hosts: &[usize]) -> Opinions {
-    let mut all = Opinions::default();
-    for &guest in guests {
-        let mut near: Vec<(f64, usize)> = hosts
-            .iter()
-            .map(|&host| (poses[host].distance(&poses[guest]), host))
-            .filter(|(distance_m, _)| *distance_m < REACH_M)
-            .collect();
-        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        for &(_, host) in near.iter().take(MAX_HOSTS) {
-            let host_from_guest = poses[host].between(&poses[guest]);
-            all += Opinions::of(&set.submaps[host], &set.submaps[guest], &host_from_guest);
-        }
-    }
-    all
+/// What one anchor of the guest and the host around it say of each other.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocalOpinions {
+    /// Distance to the nearest anchor of the host, metres.
+    pub nearest_m: f64,
+    pub opinions: Opinions,
 }
 
-/// What the places of a run say of those a little later, which were seen by other scans.
-pub(crate) fn own_opinions(set: &AnchorSet, run_idx: usize, submap_half_length_m: f64) -> Opinions {
-    let range = set.of_run(run_idx);
-    let mut all = Opinions::default();
-    for from in range.clone() {
-        let here = &set.anchors[from];
-        let apart_m = here.travel_m + 2.0 * submap_half_length_m;
-        let to = range.start + set.anchors[range.clone()].partition_point(|anchor| anchor.travel_m < apart_m);
-        let Some(there) = set.anchors[..range.end].get(to) else { break };
-        let relative = here.run_from_anchor.between(&there.run_from_anchor);
-        all += Opinions::of(&set.submaps[from], &set.submaps[to], &relative);
+/// Compares every guest anchor that lies on the host with the host anchors nearest to it, each where it is said to be.
+pub(crate) fn overlap(
+    site: &SiteAnchors<'_>,
+    guests: &[(AnchorIdx, Pose2)],
+    hosts: &[(AnchorIdx, Pose2)],
+) -> Vec<LocalOpinions> {
+    let mut found = Vec::new();
+    for (guest, guest_pose) in guests {
+        let mut near: Vec<(f64, AnchorIdx, &Pose2)> = hosts
+            .iter()
+            .map(|(host, pose)| (pose.distance(guest_pose), *host, pose))
+            .filter(|(distance_m, ..)| *distance_m < REACH_M)
+            .collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let mut opinions = Opinions::default();
+        for (_, host, host_pose) in near.iter().take(MAX_HOSTS) {
+            let host_from_guest = host_pose.between(guest_pose);
+            opinions += Opinions::of(site.submap(*host), site.submap(*guest), &host_from_guest);
+        }
+        if let Some((nearest_m, ..)) = near.first() {
+            found.push(LocalOpinions { nearest_m: *nearest_m, opinions });
+        }
     }
-    all
+    found
 }

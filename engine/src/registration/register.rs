@@ -20,6 +20,9 @@ pub struct SubmapFit {
     pub covariance: Matrix3<f64>,
     /// Of all returns of one that the other has an opinion about, the share that it confirms; both ways.
     pub agreement: f64,
+    /// The same of the returns of one of them alone, whichever is confirmed more: furniture that came or went and people
+    /// on one of two visits are contradicted in one direction only.
+    pub one_way_agreement: f64,
     /// Share of the returns about which the other has an opinion; both ways.
     pub overlap: f64,
 }
@@ -52,7 +55,8 @@ pub fn refine_from(
     let surface_at = |point: &Point2| earlier.surfaces.surface_at(point, config.min_count);
     let alignment = align(surface_at, &later.fine_points, &prior, start, &settings);
     let pose = alignment.map_from_points;
-    let opinions = Opinions::of(earlier, later, &pose).all();
+    let both = Opinions::of(earlier, later, &pose);
+    let opinions = both.all();
     let num_opinions = opinions.num_confirmed + opinions.num_contradicted;
     let num_points = (later.fine_points.len() + earlier.fine_points.len()) as f64;
     if num_opinions == 0 {
@@ -71,6 +75,7 @@ pub fn refine_from(
         earlier_from_later: pose,
         covariance,
         agreement: f64::from(opinions.num_confirmed) / f64::from(num_opinions),
+        one_way_agreement: 1.0 - both.one_sided_contradiction(),
         overlap: f64::from(num_opinions) / num_points,
     })
 }
@@ -149,6 +154,14 @@ impl Opinions {
             of_later: Tally::count(&earlier.evidence, &later.fine_points, earlier_from_later),
             of_earlier: Tally::count(&later.evidence, &earlier.fine_points, &earlier_from_later.inverse()),
         }
+    }
+
+    /// The share of the returns of one of them that the other contradicts, whichever way is less.
+    /// A direction without opinions bears nothing out.
+    pub fn one_sided_contradiction(&self) -> f64 {
+        let has_opinions = |tally: &&Tally| tally.num_confirmed + tally.num_contradicted > 0;
+        let directions = [self.of_later, self.of_earlier];
+        directions.iter().filter(has_opinions).map(Tally::contradiction).fold(1.0, f64::min)
     }
 
     /// Both ways together.

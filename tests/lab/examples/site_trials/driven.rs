@@ -9,7 +9,8 @@ use locution_engine::mapping::{Keyframe, RunRecord};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::{Translation, Translator};
-use locution_lab::recordings::read_recording;
+use locution_lab::evaluation::{OdometryPose, join_truth};
+use locution_lab::recordings::{read_recording, read_truth};
 use locution_lab::simulation::{PeopleConfig, SimulationConfig, Task, simulate_run};
 use locution_lab::worlds::read_world;
 use serde::{Deserialize, Serialize};
@@ -46,12 +47,29 @@ impl Driven {
         })
     }
 
-    /// A recording of the data sets.
+    /// A recording of the data sets, or of several that are named `intel/2/4` the second of four parts. Recordings of
+    /// one building share their name up to the digits at its end.
     pub fn recorded(name: &str) -> Result<Self, Failure> {
-        kept(name, || {
-            let path = datasets().join("laser").join(format!("{name}.log.gz"));
-            let log = read_recording(&path, CarmenOptions::default())?.log;
-            Self::translated(name, log.geometry.clone(), &log.scans)
+        kept(&name.replace('/', "-of-"), || {
+            let parts: Vec<&str> = name.split('/').collect();
+            let (name, part, num_parts) = match parts[..] {
+                [name, part, num_parts] => (name, part.parse::<usize>()? - 1, num_parts.parse::<usize>()?),
+                _ => (name, 0, 1),
+            };
+            let folder = datasets().join("laser");
+            let log = read_recording(&folder.join(format!("{name}.log.gz")), CarmenOptions::default())?.log;
+            let poses = read_truth(&folder.join(format!("{name}.truth.gz"))).unwrap_or_default();
+            let odometry = log.scans.iter().map(|scan| OdometryPose {
+                timestamp_ns: scan.timestamp_ns,
+                odom_from_robot: scan.odom_from_robot,
+            });
+            let truth = join_truth(&odometry.collect::<Vec<_>>(), &poses);
+            let bound = |part: usize| log.scans.len() * part / num_parts;
+            let range = bound(part)..bound(part + 1);
+            let building = name.trim_end_matches(|c: char| c.is_ascii_digit());
+            let mut run = Self::translated(building, log.geometry.clone(), &log.scans[range.clone()])?;
+            run.truth = carried(&run.keyframes, &truth[range]);
+            Ok(run)
         })
     }
 
@@ -117,4 +135,20 @@ fn datasets() -> PathBuf {
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/datasets"),
         PathBuf::from,
     )
+}
+
+/// True poses of keyframes; where nobody knows them, those known before, carried on along the refined odometry.
+fn carried(keyframes: &[Keyframe], truth: &[Option<Pose2>]) -> Vec<Pose2> {
+    let of = |keyframe: &Keyframe| truth.get(keyframe.scan_seq as usize).copied().flatten();
+    let Some(mut known) = keyframes.iter().find_map(|keyframe| Some((keyframe, of(keyframe)?))) else {
+        return Vec::new();
+    };
+    let mut poses = Vec::with_capacity(keyframes.len());
+    for keyframe in keyframes {
+        if let Some(pose) = of(keyframe) {
+            known = (keyframe, pose);
+        }
+        poses.push(known.1.compose(&known.0.run_from_robot.between(&keyframe.run_from_robot)));
+    }
+    poses
 }

@@ -3,6 +3,7 @@
 //! - `fleets 200 1 ipa-office-c stage-hospital`: three robots of 150 m with unknown starts in each world, two people
 //!   walking; false and missed joins. The numbers are the first seed and how many fleets of a world.
 //! - `strangers 200 ipa-lab-a ipa-office-a`: one robot in each world, all in one site; nothing may be joined.
+//! - `recordings wean1 wean3 intel/1/2 intel/2/2`: recordings or parts of them in one site, judged by their truth.
 //! - `order recordings wean1 wean3 wean4`, `order fleet ipa-lab-a 200`: every order must give the same map.
 //! - `growth 5 ipa-lab-a`: so many runs of 80 m in a world and its furnished twin, three people walking.
 //!
@@ -41,6 +42,12 @@ fn main() -> Result<(), Failure> {
                 .map(|seed| Driven::wandering(world, LENGTH_M, NUM_PEOPLE, seed))
                 .collect::<Result<Vec<_>, _>>()?;
             order::all_orders(&format!("{world} {first_seed}"), &runs)
+        }
+        ["recordings", names @ ..] => {
+            let runs = names.iter().map(|name| Driven::recorded(name)).collect::<Result<Vec<_>, _>>()?;
+            let (map, seconds) = mapped(&runs)?;
+            println!("{}", serde_json::to_string(&judged(&names.join(" "), &runs, &map, seconds))?);
+            Ok(())
         }
         ["growth", num_runs, world] => growth(num_runs.parse()?, world),
         _ => {

@@ -1,0 +1,153 @@
+//! Runs that hang together, with the closures that hold them: they settle, and they are laid over each other.
+
+use super::coarse_graph::{Closure, CoarseGraph};
+use super::guided::guided_round;
+use super::indices::{AnchorIdx, RunIdx};
+use super::join_evidence::JoinEvidence;
+use super::judgements::Judgements;
+use super::memo::RegistrationMemo;
+use super::place_match::{Channel, RejectionReason};
+use super::refusals::Refusal;
+use super::site_anchors::SiteAnchors;
+use super::watch::{MappingError, Span};
+use super::ways::Way;
+use crate::registration::Opinions;
+
+/// Runs that share a frame.
+#[derive(Clone)]
+pub(crate) struct Component<'a> {
+    pub graph: CoarseGraph<'a>,
+    /// Constraints that the graph keeps.
+    pub closures: Vec<Closure>,
+    /// Fits between its anchors that do not constrain it.
+    pub refused: Vec<Refusal>,
+}
+
+/// What stays the same while a map is being built, and which part of that is at hand.
+#[derive(Clone, Copy)]
+pub(crate) struct Workshop<'a> {
+    pub site: &'a SiteAnchors<'a>,
+    pub judgements: &'a Judgements<'a>,
+    pub memo: &'a RegistrationMemo,
+    pub span: Span<'a>,
+}
+
+impl Workshop<'_> {
+    /// For one of equal parts of the work.
+    pub fn part(self, idx: usize, num_parts: usize) -> Self {
+        Self { span: self.span.part(idx, num_parts), ..self }
+    }
+}
+
+impl<'a> Component<'a> {
+    /// A run on its own, settled.
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn alone(workshop: Workshop<'a>, run: RunIdx) -> Result<Self, MappingError> {
+        let site = workshop.site;
+        let mut graph = CoarseGraph::new(site, vec![run], |anchor| site.anchor(anchor).run_from_anchor)?;
+        graph.optimize(&[])?;
+        let mut component = Self { graph, closures: Vec::new(), refused: Vec::new() };
+        component.settle(workshop)?;
+        Ok(component)
+    }
+
+    /// Guided matching and optimization in turns, until nothing new is found.
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn settle(&mut self, workshop: Workshop<'a>) -> Result<(), MappingError> {
+        let Workshop { site, judgements, memo, span } = workshop;
+        let may_match = |a, b| site.may_match(a, b) && !judgements.forbid(a, b);
+        let max_rounds = site.config.max_rounds;
+        for round in 0..max_rounds {
+            let round = guided_round(&self.graph, &may_match, memo, span.part(round, max_rounds))?;
+            let kept = self.graph.optimize(&round.closures)?;
+            let (found, dropped) = sorted_out(round.closures, &kept);
+            let refusal = |closure| Refusal {
+                channel: Channel::Spatial,
+                closure,
+                reason: RejectionReason::Inconsistent,
+            };
+            self.refused = round.refused.into_iter().chain(dropped).map(refusal).collect();
+            let is_settled = num_changed(&self.closures, &found) * 100 <= found.len();
+            self.closures = found;
+            if is_settled {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Share of the returns that its places contradict where it was driven again, in the direction in which it is less;
+    /// 0 when it never came back to a place.
+    pub fn own_contradiction(&self) -> f64 {
+        let site = self.graph.site;
+        let mut opinions = Opinions::default();
+        for Closure { earlier, later, .. } in &self.closures {
+            let relative = self.graph.pose(*earlier).between(&self.graph.pose(*later));
+            opinions += Opinions::of(site.submap(*earlier), site.submap(*later), &relative);
+        }
+        if self.closures.is_empty() { 0.0 } else { opinions.one_sided_contradiction() }
+    }
+
+    /// Two components in one frame as a way says, extended to wherever they then run beside each other, with what
+    /// speaks for and against it; none when it falls apart at once.
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn laid_over(
+        host: &Self,
+        guest: &Self,
+        way: &Way,
+        workshop: Workshop<'a>,
+    ) -> Result<Option<(Self, JoinEvidence)>, MappingError> {
+        let mut both = Self::side_by_side(host, guest, way)?;
+        let inside = [host.closures.as_slice(), &guest.closures].concat();
+        let mut across = way.closures.clone();
+        let mut tried = Vec::new();
+        let is_across = |a, b| host.graph.holds(a) != host.graph.holds(b);
+        let may_match = |a, b| is_across(a, b) && !workshop.judgements.forbid(a, b);
+        for is_last in [false, false, true] {
+            let closures = [inside.as_slice(), &across].concat();
+            let kept = both.graph.optimize(&closures)?;
+            if !kept[inside.len()..].contains(&true) {
+                return Ok(None);
+            }
+            if is_last {
+                both.closures = sorted_out(closures, &kept).0;
+            } else {
+                let round = guided_round(&both.graph, &may_match, workshop.memo, workshop.span)?;
+                (across, tried) = (round.closures, round.tried);
+            }
+        }
+        let evidence = JoinEvidence::of(&both, host, guest, &tried, workshop);
+        Ok(Some((both, evidence)))
+    }
+
+    fn side_by_side(host: &Self, guest: &Self, way: &Way) -> Result<Self, MappingError> {
+        let runs = [host.graph.runs(), guest.graph.runs()].concat();
+        let pose_of = |anchor: AnchorIdx| match host.graph.holds(anchor) {
+            true => host.graph.pose(anchor),
+            false => way.host_from_guest.compose(&guest.graph.pose(anchor)),
+        };
+        let graph = CoarseGraph::new(host.graph.site, runs, pose_of)?;
+        Ok(Self { graph, closures: Vec::new(), refused: Vec::new() })
+    }
+}
+
+/// Closures that were kept, and the others.
+fn sorted_out(closures: Vec<Closure>, kept: &[bool]) -> (Vec<Closure>, Vec<Closure>) {
+    let (kept, dropped): (Vec<_>, Vec<_>) = closures.into_iter().zip(kept).partition(|(_, kept)| **kept);
+    let bare = |pairs: Vec<(Closure, &bool)>| pairs.into_iter().map(|(closure, _)| closure).collect();
+    (bare(kept), bare(dropped))
+}
+
+/// How many pairs stand in one list and not in the other.
+fn num_changed(before: &[Closure], after: &[Closure]) -> usize {
+    let pairs = |closures: &[Closure]| -> std::collections::BTreeSet<(AnchorIdx, AnchorIdx)> {
+        closures.iter().map(|closure| (closure.earlier, closure.later)).collect()
+    };
+    pairs(before).symmetric_difference(&pairs(after)).count()
+}

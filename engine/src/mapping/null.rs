@@ -1,0 +1,86 @@
+//! How alike different places of this very building are: what a likeness is measured by.
+//!
+//! A run on its own has one frame, so two stretches of it that lie far apart are certainly different places. Whatever
+//! lays the run over itself there is wrong, however well it fits. How far such ways reach, and how little contradicts
+//! them, is what a join between runs must exceed.
+
+use rayon::prelude::*;
+
+use super::candidates::candidates_within;
+use super::component::{Component, Workshop};
+use super::config::MappingConfig;
+use super::indices::AnchorIdx;
+use super::join_evidence::{BESIDE_M, JoinEvidence};
+use super::overlap::overlap;
+use super::watch::MappingError;
+use super::ways::{Groups, Way};
+use crate::geometry::Pose2;
+use crate::registration::Opinions;
+
+/// Ways of each run that are looked at, those with most fits first.
+const NUM_WAYS: usize = 3;
+
+/// The wrong ways to lay the runs of a site over themselves.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Null {
+    ways: Vec<WrongWay>,
+}
+
+/// What a wrong way looks like.
+#[derive(Clone, Copy, Debug)]
+struct WrongWay {
+    /// Anchors that then lie beside others.
+    num_beside: usize,
+    /// Share of the returns that contradict, in the direction in which it is less.
+    one_sided_contradiction: f64,
+}
+
+impl Null {
+    /// Lays every run over itself in the wrong ways that its candidates propose.
+    ///
+    /// # Errors
+    /// [`MappingError::Stopped`].
+    pub fn of(alone: &[Component<'_>], workshop: Workshop<'_>) -> Result<Self, MappingError> {
+        let of_run = |(idx, component): (usize, &Component<'_>)| {
+            wrong_ways(component, workshop.part(idx, alone.len()))
+        };
+        let ways = alone.par_iter().enumerate().map(of_run).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { ways: ways.into_iter().flatten().collect() })
+    }
+
+    /// True when a wrong way of this building reaches about as far and is contradicted as little.
+    pub fn explains(&self, evidence: &JoinEvidence, config: &MappingConfig) -> bool {
+        let reach = config.min_reach_over_null * evidence.num_beside as f64;
+        let contradiction = config.null_slack * evidence.one_sided_contradiction;
+        self.ways
+            .iter()
+            .any(|way| way.num_beside as f64 >= reach && way.one_sided_contradiction <= contradiction)
+    }
+}
+
+fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Result<Vec<WrongWay>, MappingError> {
+    let (graph, site) = (&component.graph, workshop.site);
+    let mut candidates = Vec::new();
+    for &run in graph.runs() {
+        candidates.extend(candidates_within(site, run));
+    }
+    let apart_m = site.config.neighbor_distance_m;
+    candidates.retain(|found| graph.pose(found.earlier).distance(&graph.pose(found.later)) > apart_m);
+    let registered = Groups::new(component, component, &candidates).ways(workshop)?;
+    Ok(registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way)).collect())
+}
+
+/// The component laid over itself, moved as a whole.
+fn wrong_way(component: &Component<'_>, way: &Way) -> WrongWay {
+    let site = component.graph.site;
+    let hosts = component.graph.placed(component.graph.anchors());
+    let moved = |(anchor, pose): &(AnchorIdx, Pose2)| (*anchor, way.host_from_guest.compose(pose));
+    let guests: Vec<_> = hosts.iter().map(moved).collect();
+    let locals = overlap(site, &guests, &hosts);
+    let mut opinions = Opinions::default();
+    locals.iter().for_each(|local| opinions += local.opinions);
+    WrongWay {
+        num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
+        one_sided_contradiction: opinions.one_sided_contradiction(),
+    }
+}
