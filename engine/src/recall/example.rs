@@ -86,7 +86,7 @@ impl Example {
                     ranges_m: &scans[keyframe.scan].ranges_m,
                 })
                 .collect();
-            Submap::of_lasting_things(geometry, &members, frame, &config.submap)
+            Submap::new(geometry, &members, frame, &config.submap)
         };
         let tail_first = keyframes.partition_point(|keyframe| keyframe.travel_m < travel_m - TAIL_M);
         let whole = submap(&keyframes, config.max_scans, &middle.run_from_robot);

@@ -61,9 +61,10 @@ async fn insist<T>(what: &str, mut ask: impl AsyncFnMut() -> Result<T, AppError>
 
 /// A run of so many scans, finished.
 pub(super) async fn drive(app: &Arc<App>, site: &Arc<Site>, run: &Name, num_scans: usize) {
-    let new = NewRun { robot: None, geometry: geometry() };
+    let geometry = geometry();
+    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
     app.make_run(site, run, new).await.unwrap();
-    let batch = NewBatch { first_sequence: 0, scans: scans()[..num_scans].to_vec() };
+    let batch = NewBatch { first_sequence: 0, scans: scans()[..num_scans].to_vec(), has_odometry: true };
     app.append_batch(Arc::clone(site), run, batch).await.unwrap();
     app.finish_run(Arc::clone(site), run).await.unwrap();
 }

@@ -187,6 +187,7 @@ impl Gathered {
                 Some(Scan {
                     timestamp_ns: scan.timestamp_ns,
                     odom_from_robot,
+                    angular_velocity_rad_per_s: None,
                     ranges_m: layout.ranges_m(scan),
                 })
             })
