@@ -22,7 +22,7 @@ const GRAPH_HEAD: &str = "\
 # A vertex per keyframe, an edge per motion, and one per registration of verified matches; one FIX per component.
 # The vertices are where the map has them, which is not quite the optimum of these edges: the map weighs registrations
 # between submaps against each other, of which a match names the one that speaks for it, and shares out among the
-# keyframes in between. Optimising this file therefore moves vertices by some centimetres.
+# keyframes in between. Solving these edges anew therefore moves vertices, by a few decimeters where few matches tie a run.
 ";
 
 /// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified matches, and
