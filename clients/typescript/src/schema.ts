@@ -897,6 +897,11 @@ export interface components {
             travel_m: number;
             /** @description Places where the robot was at the end of the example, likeliest first. */
             places: components["schemas"]["ExamplePlace"][];
+            /**
+             * Format: double
+             * @description Probability that the example was not made in this site.
+             */
+            probability_elsewhere: number;
         };
         /** @description What speaks for and against a place, by the stage that found it. */
         ExampleEvidence: {
@@ -1222,6 +1227,15 @@ export interface components {
             travel_m: number;
             /** @description Likeliest first. */
             hypotheses: components["schemas"]["Hypothesis"][];
+            /**
+             * Format: double
+             * @description Probability that the robot is not in this map; with those of all places 1.
+             */
+            probability_elsewhere: number;
+            /** @description What is missing to be `converged`; empty when it is. */
+            missing: components["schemas"]["Missing"][];
+            /** @description Whether the likeliest place is the one that was declared; absent without a declaration or a likely place. */
+            prior_agrees?: boolean | null;
         };
         /**
          * @description How sure an answer is.
@@ -1334,12 +1348,18 @@ export interface components {
          * @enum {string}
          */
         MatchState: "candidate" | "verified" | "rejected";
-        /** @description Opens a localisation; the same body as that of a run. */
+        /**
+         * @description What is missing before a robot counts as found.
+         * @enum {string}
+         */
+        Missing: "travel" | "elsewhere" | "alternatives" | "persistence" | "recent_scans" | "position";
+        /** @description Opens a localisation; the body of a run, and what is known of where the robot is. */
         NewLocalization: {
             /** @description The robot, for the log. */
             robot?: string | null;
             /** @description The laser. */
             geometry: components["schemas"]["Geometry"];
+            prior?: components["schemas"]["PosePrior"] | null;
         };
         /** @description Makes a run. */
         NewRun: {
@@ -1468,6 +1488,18 @@ export interface components {
              * @example 1.5708
              */
             theta: number;
+        };
+        /** @description A rough pose that a person or another system declares. It is weighed, not believed. */
+        PosePrior: {
+            /**
+             * Format: int64
+             * @description The component of the map whose frame the pose is in.
+             */
+            component?: number;
+            /** @description Where. */
+            map_from_robot: components["schemas"]["Pose"];
+            /** @description Covariance of (x, y, θ), row by row. */
+            covariance: number[][];
         };
         /** @description What went wrong (RFC 9457). */
         Problem: {

@@ -147,7 +147,6 @@ const STATE_TEXT: Record<string, string> = { lost: "Lost", ambiguous: "Not sure 
 function MomentView({ moment, recording, start }: { moment: Moment; recording: Recording; start: number }) {
   const { component, stage } = useSite();
   const { session, numScans } = moment;
-  const elsewhere = Math.max(0, 1 - session.hypotheses.reduce((sum, guess) => sum + guess.probability, 0));
   const show = (guess: Schemas["Hypothesis"]) => {
     if (guess.component !== component) patch({ component: String(guess.component) });
     stage.view?.show(guess.map_from_robot);
@@ -171,7 +170,7 @@ function MomentView({ moment, recording, start }: { moment: Moment; recording: R
           </li>
         ))}
       </ol>
-      <p class="soft">Elsewhere: {percent(elsewhere)}</p>
+      <p class="soft">Not in this map: {percent(session.probability_elsewhere)}</p>
     </>
   );
 }
