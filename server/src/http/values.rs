@@ -150,7 +150,7 @@ pub struct PageParams {
     #[param(minimum = 1, maximum = 10_000, default = 100)]
     pub limit: Option<usize>,
     /// `next_cursor` of the page before.
-    #[param(pattern = "^[0-9]+$", max_length = 19)]
+    #[param(pattern = "^[0-9]+$", max_length = 20)]
     pub cursor: Option<String>,
 }
 
@@ -173,9 +173,9 @@ impl PageParams {
     }
 }
 
-/// A cursor is a number as pages write it: digits, no more than a number of 63 bits has.
+/// A cursor is a number as pages write it: digits, no more than a number of 64 bits has.
 fn parse_cursor(cursor: &str) -> Option<u64> {
-    let is_written_by_a_page = cursor.len() <= 19 && cursor.bytes().all(|byte| byte.is_ascii_digit());
+    let is_written_by_a_page = cursor.len() <= 20 && cursor.bytes().all(|byte| byte.is_ascii_digit());
     if is_written_by_a_page { cursor.parse().ok() } else { None }
 }
 

@@ -43,15 +43,36 @@ impl SiteState {
     }
 }
 
-/// A site's configuration as it was stored; sections that configured no part of the server, and that sites of older
-/// versions hold, are passed over.
+/// A site's configuration as it was stored. Members that sites of earlier versions hold and that this one no longer has
+/// are passed over: what they set is gone. Values that cannot be read are an error.
 fn stored_config(json: &str) -> Result<EngineConfig, serde_json::Error> {
-    const RETIRED: [&str; 3] = ["density_field", "density_model", "particle_filter"];
     let mut config: serde_json::Value = serde_json::from_str(json)?;
-    if let Some(localization) = config.get_mut("localization").and_then(serde_json::Value::as_object_mut) {
-        localization.retain(|section, _| !RETIRED.contains(&section.as_str()));
+    loop {
+        let error = match serde_path_to_error::deserialize(&config) {
+            Ok(config) => return Ok(config),
+            Err(error) => error,
+        };
+        let is_retired = error.inner().to_string().starts_with("unknown field");
+        if !is_retired || !remove_member(&mut config, error.path()) {
+            return Err(error.into_inner());
+        }
     }
-    serde_json::from_value(config)
+}
+
+/// Takes the member at a path out; false when there is none.
+fn remove_member(value: &mut serde_json::Value, path: &serde_path_to_error::Path) -> bool {
+    use serde_path_to_error::Segment;
+    let names: Vec<&str> = path
+        .iter()
+        .filter_map(|segment| match segment {
+            Segment::Map { key } => Some(key.as_str()),
+            Segment::Enum { variant } => Some(variant.as_str()),
+            Segment::Seq { .. } | Segment::Unknown => None,
+        })
+        .collect();
+    let Some((last, above)) = names.split_last() else { return false };
+    let holder = above.iter().try_fold(value, |value, name| value.get_mut(*name));
+    holder.and_then(serde_json::Value::as_object_mut).is_some_and(|members| members.remove(*last).is_some())
 }
 
 /// All that decides what text a run becomes.
@@ -60,4 +81,23 @@ pub struct TextConfig {
     pub engine: Arc<EngineConfig>,
     /// The partition of densities that the generation is written with, when it is not the configured one.
     pub quantizer: Option<Quantizer>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn members_of_earlier_versions_are_passed_over_and_nothing_else_is() {
+        let json = r#"{"localization": {"agreement_sure": 0.9, "particle_filter": {"a": 1}, "localizer": {"history_m": 12.0}},
+            "mapping": {"gone": [1, 2]}}"#;
+        let config = stored_config(json).unwrap();
+        assert_eq!(config.localization.localizer.history_m, 12.0);
+        assert_eq!(config.mapping, EngineConfig::default().mapping);
+        for wrong in
+            [r#"{"localization": {"localizer": {"history_m": "far"}}}"#, r#"{"mapping": 3}"#, "[]", "{"]
+        {
+            assert!(stored_config(wrong).is_err(), "{wrong}");
+        }
+    }
 }
