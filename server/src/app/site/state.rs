@@ -43,8 +43,9 @@ impl SiteState {
     }
 }
 
-/// A site's configuration as it was stored. Members that sites of earlier versions hold and that this one no longer has
-/// are passed over: what they set is gone. Values that cannot be read are an error.
+/// A site's configuration as it was stored. Members that sites of earlier versions hold and that this one no longer has,
+/// or has in another form, are passed over: what they set is gone. How texts are written must not change that way, so
+/// there a value in another form is an error.
 fn stored_config(json: &str) -> Result<EngineConfig, serde_json::Error> {
     let mut config: serde_json::Value = serde_json::from_str(json)?;
     loop {
@@ -52,8 +53,9 @@ fn stored_config(json: &str) -> Result<EngineConfig, serde_json::Error> {
             Ok(config) => return Ok(config),
             Err(error) => error,
         };
-        let is_retired = error.inner().to_string().starts_with("unknown field");
-        if !is_retired || !remove_member(&mut config, error.path()) {
+        let is_unknown = error.inner().to_string().starts_with("unknown field");
+        let is_of_texts = error.path().to_string().starts_with("translator");
+        if (is_of_texts && !is_unknown) || !remove_member(&mut config, error.path()) {
             return Err(error.into_inner());
         }
     }
@@ -89,14 +91,13 @@ mod tests {
 
     #[test]
     fn members_of_earlier_versions_are_passed_over_and_nothing_else_is() {
-        let json = r#"{"localization": {"agreement_sure": 0.9, "particle_filter": {"a": 1}, "localizer": {"history_m": 12.0}},
-            "mapping": {"gone": [1, 2]}}"#;
-        let config = stored_config(json).unwrap();
+        let json = r#"{"localization": {"agreement_sure": 0.9, "particle_filter": {"a": 1},
+            "localizer": {"history_m": 12.0, "max_points": [1, 2]}}, "mapping": {"gone": [1, 2]}}"#;
+        let (config, default) = (stored_config(json).unwrap(), EngineConfig::default());
         assert_eq!(config.localization.localizer.history_m, 12.0);
-        assert_eq!(config.mapping, EngineConfig::default().mapping);
-        for wrong in
-            [r#"{"localization": {"localizer": {"history_m": "far"}}}"#, r#"{"mapping": 3}"#, "[]", "{"]
-        {
+        assert_eq!(config.localization.localizer.max_points, default.localization.localizer.max_points);
+        assert_eq!(config.mapping, default.mapping);
+        for wrong in [r#"{"translator": {"local_map": 3}}"#, "3", "{"] {
             assert!(stored_config(wrong).is_err(), "{wrong}");
         }
     }
