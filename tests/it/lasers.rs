@@ -80,7 +80,7 @@ async fn minus_infinity_is_too_near_to_tell() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn millimetres_and_degrees_are_told() {
+async fn readings_in_thousandths_and_angles_in_degrees_are_told() {
     let server = TestServer::start().await;
     let api = &server.api;
     for (field, value, word) in [

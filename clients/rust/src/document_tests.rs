@@ -84,9 +84,9 @@ fn bodies_have_every_member_of_the_document() {
     }
     check! {
         Change ChangeKind ChangedSite Channel Component Connection ConnectionKind DecisionKind Direction Event
-        Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval Job JobKind
-        JobState KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
-        MapRun MapStatistics Match MatchState Missing NewLocalization NewRun Observation Place PlaceLabel Point
+        Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval IssuedKey Job JobKind
+        JobState Key Keys KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
+        MapRun MapStatistics Match MatchState Missing NewKey NewLocalization NewRun Observation Place PlaceLabel Point
         Pose PosePrior Receipt Region Registration RejectionReason Retention Route RouteStep RouteTurn Run
         RunChange RunState Scan Site SiteChange SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word
         WordAnswer WordId WordPattern WordQuery

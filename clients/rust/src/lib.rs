@@ -28,6 +28,7 @@ mod client;
 mod error;
 mod events;
 mod jobs;
+mod keys;
 mod localizations;
 mod maps;
 mod matches;

@@ -89,6 +89,10 @@ routes! {
     LIST_WORDS "list_words" GET "/v1/sites/{site}/runs/{run}/words";
     GET_TRAJECTORY "get_trajectory" GET "/v1/sites/{site}/runs/{run}/trajectory";
     GET_TRAJECTORY_TUM "get_trajectory_tum" GET "/v1/sites/{site}/runs/{run}/trajectory.tum";
+    LIST_KEYS "list_keys" GET "/v1/keys";
+    MAKE_KEY "make_key" POST "/v1/keys";
+    ROTATE_KEY "rotate_key" POST "/v1/keys/{key}/rotate";
+    REVOKE_KEY "revoke_key" DELETE "/v1/keys/{key}";
     BUILD_MAP "build_map" POST "/v1/sites/{site}/builds";
     LIST_JOBS "list_jobs" GET "/v1/sites/{site}/jobs";
     GET_JOB "get_job" GET "/v1/sites/{site}/jobs/{id}";

@@ -4,6 +4,7 @@
 
 mod events;
 mod jobs;
+mod keys;
 mod localizations;
 mod maps;
 mod matches;
@@ -14,6 +15,7 @@ mod values;
 
 pub use events::{Event, RunChange};
 pub use jobs::{Job, JobKind, JobState};
+pub use keys::{IssuedKey, Key, Keys, NewKey};
 pub use localizations::{
     ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState, Missing,
     NewLocalization, PosePrior,
