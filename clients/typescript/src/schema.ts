@@ -62,10 +62,62 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** A page to look at sites, runs and maps; one file, nothing is loaded from elsewhere. */
+        /** A page to look at sites, send recordings, ask and decide; nothing is loaded from elsewhere. */
         get: operations["get_ui"];
         put?: never;
         post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/keys": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** The keys that this key may manage: all, or those of its sites. */
+        get: operations["list_keys"];
+        put?: never;
+        /** Make a key; its secret is in this answer and nowhere else. */
+        post: operations["make_key"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/keys/{key}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        post?: never;
+        /** Revoke a key; it opens nothing from now on. */
+        delete: operations["revoke_key"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/keys/{key}/rotate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Give a key another secret. */
+        post: operations["rotate_key"];
         delete?: never;
         options?: never;
         head?: never;
@@ -83,6 +135,23 @@ export interface paths {
         put?: never;
         /** Where was this recorded, of all sites that the key may see? Sites without a map are passed over. */
         post: operations["query_example_everywhere"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/queries/labels": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** The same over all sites that the key may see, the surest first. Sites without a map are passed over. */
+        post: operations["query_labels_everywhere"];
         delete?: never;
         options?: never;
         head?: never;
@@ -139,7 +208,8 @@ export interface paths {
         delete: operations["delete_site"];
         options?: never;
         head?: never;
-        patch?: never;
+        /** Change a site's configuration or how much of it is kept. When there is a map, a build is queued that makes it accordingly. */
+        patch: operations["change_site"];
         trace?: never;
     };
     "/v1/sites/{site}/backup": {
@@ -197,6 +267,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * What happens in the site from now on, as server-sent events: runs, words, jobs, map versions, matches, robots found
+         *     and lost. Each has an `id`; with the last one as `Last-Event-ID` a stream goes on behind it while the latest 1,000
+         *     events are kept, and begins with `missed` when some have gone or the server was started anew. The stream ends when
+         *     the site is deleted or the server stops.
+         */
+        get: operations["watch_site"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/jobs": {
         parameters: {
             query?: never;
@@ -225,7 +317,11 @@ export interface paths {
         get: operations["get_job"];
         put?: never;
         post?: never;
-        delete?: never;
+        /**
+         * Cancel a job. One that waits is over at once, one that runs ends at its next step; one that has ended stays as it is.
+         *     What it had made so far is not served.
+         */
+        delete: operations["cancel_job"];
         options?: never;
         head?: never;
         patch?: never;
@@ -255,7 +351,8 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        get?: never;
+        /** All localisations that are open in the site, the oldest first. Listing them keeps none of them open. */
+        get: operations["list_localizations"];
         put?: never;
         /** Open a localisation in the serving map; nothing of it is stored. */
         post: operations["open_localization"];
@@ -619,7 +716,11 @@ export interface paths {
         /** Make a run, or find it as it stands. */
         put: operations["make_run"];
         post?: never;
-        delete?: never;
+        /**
+         * Forget a run with all its traces. It is unknown and its scans and texts are gone at once; when there is a map, a build is
+         *     queued that makes a version without it, and versions that hold it are dropped then.
+         */
+        delete: operations["delete_run"];
         options?: never;
         head?: never;
         patch?: never;
@@ -687,7 +788,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Stored scans, in order. */
+        /** Stored scans, in order; all of them, or those of a time and an area. */
         get: operations["list_scans"];
         put?: never;
         post?: never;
@@ -806,6 +907,12 @@ export interface components {
             /** @description Where the next page begins; null at the end. */
             next_cursor?: string | null;
         };
+        /** @description A site after it was changed. */
+        ChangedSite: {
+            /** @description The site. */
+            site: components["schemas"]["Site"];
+            job?: components["schemas"]["Job"] | null;
+        };
         /**
          * @description What found a place.
          * @enum {string}
@@ -850,6 +957,81 @@ export interface components {
          * @enum {string}
          */
         Direction: "same" | "opposite";
+        /** @description Something that happened in a site. */
+        Event: {
+            /** @description Its name. */
+            run: string;
+            /** @description What became of it. */
+            change: components["schemas"]["RunChange"];
+            /** @enum {string} */
+            event: "run";
+        } | {
+            /** @description The run. */
+            run: string;
+            /**
+             * Format: int64
+             * @description The sequence number that it expects next.
+             */
+            next_sequence: number;
+            /**
+             * Format: int64
+             * @description Observations of the run.
+             */
+            num_observations: number;
+            /**
+             * Format: int64
+             * @description Words of all levels of the run.
+             */
+            num_words: number;
+            /** @enum {string} */
+            event: "words";
+        } | {
+            /** @description As it stood. */
+            job: components["schemas"]["Job"];
+            /** @enum {string} */
+            event: "job";
+        } | {
+            /**
+             * Format: int64
+             * @description Its number.
+             */
+            version: number;
+            /**
+             * Format: int64
+             * @description Parts that nothing connects.
+             */
+            num_components: number;
+            /** @enum {string} */
+            event: "version";
+        } | {
+            /**
+             * Format: int64
+             * @description Its number.
+             */
+            version: number;
+            /**
+             * Format: int64
+             * @description Matches, whatever became of them.
+             */
+            num_matches: number;
+            /**
+             * Format: int64
+             * @description Matches that hold the map together.
+             */
+            num_verified: number;
+            /** @enum {string} */
+            event: "matches";
+        } | {
+            /** @description Name of the localisation. */
+            id: string;
+            /** @description How sure it is now. */
+            state: components["schemas"]["LocalizationState"];
+            /** @enum {string} */
+            event: "localization";
+        } | {
+            /** @enum {string} */
+            event: "missed";
+        };
         /** @description What speaks for and against a match. */
         Evidence: {
             /**
@@ -978,6 +1160,12 @@ export interface components {
              */
             num_ranges: number;
             /**
+             * @description Fewest readings of a scan, of a laser whose number varies; those missing at the end say nothing. As many as
+             *     `num_ranges` unless said.
+             * @example 180
+             */
+            num_ranges_min?: number | null;
+            /**
              * Format: double
              * @description Direction of the first beam in the laser's frame.
              * @example -1.5708
@@ -985,7 +1173,7 @@ export interface components {
             angle_min_rad: number;
             /**
              * Format: double
-             * @description From one beam to the next; negative when the sweep runs clockwise.
+             * @description From one beam to the next; negative when the sweep runs clockwise, as that of a laser mounted upside down.
              * @example 0.0174533
              */
             angle_increment_rad: number;
@@ -995,6 +1183,12 @@ export interface components {
              * @example 81.83
              */
             range_max_m: number;
+            /**
+             * Format: double
+             * @description A reading below this, or −∞, means "too near to tell" and says nothing; 0 unless said.
+             * @example 0.06
+             */
+            range_min_m?: number;
             /** @description Where the laser sits on the robot; at its centre looking ahead unless said. */
             robot_from_laser?: components["schemas"]["Pose"];
         };
@@ -1050,6 +1244,32 @@ export interface components {
              * @description Last observation, inclusive.
              */
             last: number;
+            /**
+             * Format: int64
+             * @description Timestamp of the first, nanoseconds; null in map versions of earlier programs, as what follows.
+             */
+            first_timestamp_ns?: number | null;
+            /**
+             * Format: int64
+             * @description Timestamp of the last, nanoseconds.
+             */
+            last_timestamp_ns?: number | null;
+            /**
+             * Format: int64
+             * @description Component of the map.
+             */
+            component?: number | null;
+            map_from_middle?: components["schemas"]["Pose"] | null;
+        };
+        /** @description A key with its secret, which is shown this once and kept nowhere. */
+        IssuedKey: {
+            /**
+             * @description The secret, sent as `Authorization: Bearer …`.
+             * @example loc_5f2b…
+             */
+            secret: string;
+            /** @description The key. */
+            key: components["schemas"]["Key"];
         };
         /** @description A long piece of work. */
         Job: {
@@ -1067,6 +1287,11 @@ export interface components {
              * @description From 0 to 1.
              */
             progress: number;
+            /**
+             * Format: double
+             * @description Seconds that it will still take at work, by the time that it has taken so far; null while that cannot be told.
+             */
+            left_s?: number | null;
             /** @description What it is at, or what came of it. */
             detail: string;
             /** @description Why it failed. */
@@ -1088,7 +1313,43 @@ export interface components {
          * @description How far a job is.
          * @enum {string}
          */
-        JobState: "queued" | "running" | "done" | "failed";
+        JobState: "queued" | "running" | "done" | "failed" | "cancelled";
+        /** @description A key, without its secret. */
+        Key: {
+            /** @description Its name. */
+            name: string;
+            /**
+             * @description What it may do.
+             * @example write
+             */
+            scope: string;
+            /** @description Where. */
+            sites: string[];
+            /** @description Whether it stands in the server's configuration, where the API cannot change it. */
+            is_configured: boolean;
+            /**
+             * Format: int64
+             * @description When it was made, seconds since 1970; null for keys of the configuration.
+             */
+            created_at_s?: number | null;
+            /**
+             * Format: int64
+             * @description When it stops being valid, seconds since 1970.
+             */
+            expires_at_s?: number | null;
+            /**
+             * Format: int64
+             * @description Until when the secret before the last rotation is valid, seconds since 1970.
+             */
+            previous_valid_until_s?: number | null;
+            /**
+             * Format: double
+             * @description Most requests in a second.
+             */
+            requests_per_s_max?: number | null;
+            /** @description Most localisations at once. */
+            num_localisations_max?: number | null;
+        };
         /** @description The pose of a keyframe in the map. */
         KeyframePose: {
             /**
@@ -1111,6 +1372,11 @@ export interface components {
              * @description Radians.
              */
             theta: number;
+        };
+        /** @description All keys that may be managed. */
+        Keys: {
+            /** @description In the order of making, those of the configuration first. */
+            items: components["schemas"]["Key"][];
         };
         /** @description A stretch of driving through places of one label. */
         Label: {
@@ -1163,6 +1429,8 @@ export interface components {
         };
         /** @description Where a question fits. */
         LabelAnswer: {
+            /** @description The site. */
+            site: string;
             /** @description The stretches, in the order of the question. */
             places: components["schemas"]["Label"][];
             /** @description Whether the run drove them the other way round. */
@@ -1229,6 +1497,11 @@ export interface components {
             hypotheses: components["schemas"]["Hypothesis"][];
             /**
              * Format: double
+             * @description Seconds until it is forgotten, unless scans come or somebody asks for it by its name.
+             */
+            expires_in_s: number;
+            /**
+             * Format: double
              * @description Probability that the robot is not in this map; with those of all places 1.
              */
             probability_elsewhere: number;
@@ -1236,6 +1509,13 @@ export interface components {
             missing: components["schemas"]["Missing"][];
             /** @description Whether the likeliest place is the one that was declared; absent without a declaration or a likely place. */
             prior_agrees?: boolean | null;
+        };
+        /** @description Part of a list. */
+        LocalizationPage: {
+            /** @description In order. */
+            items: components["schemas"]["Localization"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
         };
         /**
          * @description How sure an answer is.
@@ -1353,6 +1633,38 @@ export interface components {
          * @enum {string}
          */
         Missing: "travel" | "elsewhere" | "alternatives" | "persistence" | "recent_scans" | "position";
+        /** @description Makes a key. */
+        NewKey: {
+            /**
+             * @description 1 to 64 of `A–Z a–z 0–9 . _ -`; stands in the log.
+             * @example robot-7
+             */
+            name: string;
+            /**
+             * @description `read`, `write` or `admin`.
+             * @example write
+             */
+            scope: string;
+            /**
+             * @description Sites it may do it in; `*` means all.
+             * @example [
+             *       "office"
+             *     ]
+             */
+            sites: string[];
+            /**
+             * Format: int64
+             * @description How long it is valid, seconds; for good unless said.
+             */
+            expires_in_s?: number | null;
+            /**
+             * Format: double
+             * @description Most requests in a second, on average.
+             */
+            requests_per_s_max?: number | null;
+            /** @description Most localisations at once. */
+            num_localisations_max?: number | null;
+        };
         /** @description Opens a localisation; the body of a run, and what is known of where the robot is. */
         NewLocalization: {
             /** @description The robot, for the log. */
@@ -1621,6 +1933,24 @@ export interface components {
          * @enum {string}
          */
         RejectionReason: "weak_text" | "shape" | "density" | "registration" | "ambiguous" | "inconsistent" | "vetoed";
+        /** @description How much of a site is kept; what is left out is kept whole. */
+        Retention: {
+            /**
+             * Format: int64
+             * @description Map versions, the serving one included; as the server is configured unless said.
+             */
+            num_versions?: number | null;
+            /**
+             * Format: int64
+             * @description Runs: finished ones beyond are deleted, the oldest first, when a map is built.
+             */
+            num_runs?: number | null;
+            /**
+             * Format: int64
+             * @description Scans of all runs together: finished runs are deleted, the oldest first, when a map is built. The latest run stays.
+             */
+            num_scans?: number | null;
+        };
         /** @description A way from one position to another. */
         Route: {
             /**
@@ -1693,6 +2023,11 @@ export interface components {
              */
             num_words: number;
         };
+        /**
+         * @description What became of a run.
+         * @enum {string}
+         */
+        RunChange: "made" | "finished" | "deleted";
         /** @description Part of a list. */
         RunPage: {
             /** @description In order. */
@@ -1713,8 +2048,13 @@ export interface components {
              * @example 1763800000000000000
              */
             timestamp_ns: number;
-            /** @description Raw odometry of the robot. */
-            odom_from_robot: components["schemas"]["Pose"];
+            odom_from_robot?: components["schemas"]["Pose"] | null;
+            /**
+             * Format: double
+             * @description How fast the robot turned then by a gyroscope, counter-clockwise; it helps where odometry and laser are in doubt.
+             * @example 0.35
+             */
+            angular_velocity_rad_per_s?: number | null;
             /** @description Readings in metres, in the order of the geometry's beams. */
             ranges_m: components["schemas"]["Ranges"];
         };
@@ -1727,6 +2067,8 @@ export interface components {
             site: string;
             /** @description The engine's configuration in it, complete. */
             config: Record<string, never>;
+            /** @description How much of it is kept. */
+            retention: components["schemas"]["Retention"];
             /**
              * Format: int64
              * @description Runs.
@@ -1762,6 +2104,15 @@ export interface components {
              * @description The map version that serves; null before the first build.
              */
             map_version?: number | null;
+        };
+        /** @description Changes a site; what is left out stays. */
+        SiteChange: {
+            /**
+             * @description Members of the engine's configuration that change, as a JSON merge patch (RFC 7396): null sets a member to its
+             *     default. Everything but `translator` can be changed.
+             */
+            config?: Record<string, never> | null;
+            retention?: components["schemas"]["Retention"] | null;
         };
         /**
          * @description Whether a site can be asked.
@@ -1862,9 +2213,14 @@ export interface components {
              * @description As sent.
              */
             timestamp_ns: number;
-            /** @description As sent. */
+            /** @description As sent; all zero for a robot without odometry. */
             odom_from_robot: components["schemas"]["Pose"];
-            /** @description As sent; readings without a return are null. */
+            /**
+             * Format: double
+             * @description As sent.
+             */
+            angular_velocity_rad_per_s?: number | null;
+            /** @description As sent; readings without a return are null, those too near or missing at the end are 0. */
             ranges_m: components["schemas"]["Ranges"];
         };
         /** @description Part of a list. */
@@ -1881,8 +2237,10 @@ export interface components {
              * @description Component of the map that the poses belong to; null outside the map frame.
              */
             component?: number | null;
-            /** @description One for every scan, in order. */
+            /** @description One for every scan that was asked for, in order. */
             poses: components["schemas"]["StampedPose"][];
+            /** @description Where the next ones begin, when fewer were wanted than there are; null at the end. */
+            next_cursor?: string | null;
         };
         /**
          * @description Which way a place turns.
@@ -2033,7 +2391,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description The request took longer than the server allows */
+        /** @description The body came too slowly, or the request took longer than the server allows */
         RequestTimeout: {
             headers: {
                 [name: string]: unknown;
@@ -2087,7 +2445,7 @@ export interface components {
                 "application/problem+json": components["schemas"]["Problem"];
             };
         };
-        /** @description A queue is full; `Retry-After` says when to ask again */
+        /** @description A queue is full or a key asks too often; `Retry-After` says when to ask again */
         TooManyRequests: {
             headers: {
                 /** @description Seconds until it is worth asking again */
@@ -2170,6 +2528,7 @@ export interface operations {
             401: components["responses"]["Unauthorized"];
             403: components["responses"]["Forbidden"];
             408: components["responses"]["RequestTimeout"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2220,6 +2579,172 @@ export interface operations {
             503: components["responses"]["ServiceUnavailable"];
         };
     };
+    list_keys: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The keys, without their secrets */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Keys"];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            408: components["responses"]["RequestTimeout"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    make_key: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewKey"];
+            };
+        };
+        responses: {
+            /** @description The key and its secret */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IssuedKey"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description The name is taken */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            /** @description It would have more rights than the key that makes it */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    revoke_key: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the key, chosen when it was made */
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is revoked */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            /** @description No issued key of this name may be managed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            408: components["responses"]["RequestTimeout"];
+            /** @description It is the last one that can make others */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    rotate_key: {
+        parameters: {
+            query?: {
+                /** @description How long the old secret stays valid beside the new one, seconds; not at all unless said. */
+                grace_s?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the key, chosen when it was made */
+                key: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The key and its new secret */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["IssuedKey"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            /** @description No issued key of this name may be managed */
+            404: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
     query_example_everywhere: {
         parameters: {
             query?: never;
@@ -2241,6 +2766,40 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["ExampleAnswer"][];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            408: components["responses"]["RequestTimeout"];
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    query_labels_everywhere: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LabelQuery"];
+            };
+        };
+        responses: {
+            /** @description Where the labels are driven one after the other */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LabelAnswer"][];
                 };
             };
             400: components["responses"]["BadRequest"];
@@ -2317,6 +2876,7 @@ export interface operations {
             403: components["responses"]["Forbidden"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2347,6 +2907,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2361,9 +2922,9 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
-                "application/json": components["schemas"]["NewSite"];
+                "application/json": components["schemas"]["NewSite"] | null;
             };
         };
         responses: {
@@ -2404,6 +2965,7 @@ export interface operations {
             413: components["responses"]["PayloadTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2432,6 +2994,45 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    change_site: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["SiteChange"];
+            };
+        };
+        responses: {
+            /** @description The site as it stands now */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ChangedSite"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2462,6 +3063,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2516,6 +3118,7 @@ export interface operations {
                     "application/problem+json": components["schemas"]["Problem"];
                 };
             };
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2613,6 +3216,51 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    watch_site: {
+        parameters: {
+            query?: never;
+            header?: {
+                /** @description The `id` of the event that was read last */
+                "Last-Event-ID"?: string | null;
+            };
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Events, as long as the client reads */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": components["schemas"]["Event"];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            /** @description As many streams as the server allows are open */
+            429: {
+                headers: {
+                    /** @description Seconds until it is worth asking again */
+                    "Retry-After"?: number;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2649,6 +3297,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2681,6 +3330,40 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    cancel_job: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Its name, chosen by the server */
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The job as it ended, or as it stands when that takes longer */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2688,6 +3371,21 @@ export interface operations {
     list_labels: {
         parameters: {
             query?: {
+                /** @description Name of the run that drove them. */
+                run?: string;
+                /** @description What kind of place. */
+                label?: "bifurcation" | "corner" | "corridor" | "dead-end" | "hall";
+                /** @description Component of the map. */
+                component?: number;
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres, in the map; the middle counts.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
                 /** @description Version of the map; the serving one unless said. */
                 version?: number;
                 /** @description Most items to answer; 100 unless said. */
@@ -2728,6 +3426,44 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    list_localizations: {
+        parameters: {
+            query?: {
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of localisations */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LocalizationPage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2809,6 +3545,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2839,6 +3576,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2941,6 +3679,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -2993,6 +3732,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3045,6 +3785,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3097,6 +3838,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3149,6 +3891,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3176,7 +3919,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/yaml": string;
+                    "application/yaml": Record<string, never>;
                 };
             };
             /** @description The client has this version */
@@ -3201,6 +3944,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3253,6 +3997,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3305,6 +4050,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3357,6 +4103,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3372,6 +4119,25 @@ export interface operations {
                 direction?: "same" | "opposite";
                 /** @description Name of a run that takes part. */
                 run?: string;
+                /** @description Component of the map in which one of its stretches lies. */
+                component?: number;
+                /** @description What a person said of the pair of places. */
+                decision?: "veto" | "confirm" | "none";
+                /** @description Least probability. */
+                probability_min?: number;
+                /** @description Greatest probability. */
+                probability_max?: number;
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres, in the map; either stretch counts, at its middle.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+                /** @description In which order; as the version numbers them unless said. */
+                sort?: "id" | "probability" | "time";
                 /** @description Version of the map; the serving one unless said. */
                 version?: number;
                 /** @description Most items to answer; 100 unless said. */
@@ -3412,6 +4178,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3457,6 +4224,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3508,6 +4276,7 @@ export interface operations {
             413: components["responses"]["PayloadTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3551,6 +4320,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3600,6 +4370,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3786,6 +4557,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3822,6 +4594,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3854,6 +4627,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -3913,6 +4687,49 @@ export interface operations {
             413: components["responses"]["PayloadTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    delete_run: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the run in its site, chosen by the client */
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The run is forgotten, and the job makes the map without it */
+            202: {
+                headers: {
+                    /** @description Where the job can be watched */
+                    Location?: string;
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Job"];
+                };
+            };
+            /** @description Nothing of the run is left */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -4003,6 +4820,19 @@ export interface operations {
     list_observations: {
         parameters: {
             query?: {
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+                /** @description In whose coordinates the area is; `run` unless said. */
+                frame?: "map" | "run" | "odom";
+                /** @description Version of the map, when the frame is `map`; the serving one unless said. */
+                version?: number;
                 /** @description Most items to answer; 100 unless said. */
                 limit?: number;
                 /** @description `next_cursor` of the page before. */
@@ -4034,6 +4864,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -4041,6 +4872,19 @@ export interface operations {
     list_scans: {
         parameters: {
             query?: {
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+                /** @description In whose coordinates the area is; `odom` unless said. */
+                frame?: "map" | "run" | "odom";
+                /** @description Version of the map, when the frame is `map`; the serving one unless said. */
+                version?: number;
                 /** @description Most items to answer; 100 unless said. */
                 limit?: number;
                 /** @description `next_cursor` of the page before. */
@@ -4072,6 +4916,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -4083,6 +4928,19 @@ export interface operations {
                 frame?: "map" | "run" | "odom";
                 /** @description Version of the map, when the frame is `map`; the serving one unless said. */
                 version?: number;
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+                /** @description Most poses to answer; all unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the answer before. */
+                cursor?: number;
             };
             header?: never;
             path: {
@@ -4120,6 +4978,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -4131,6 +4990,19 @@ export interface operations {
                 frame?: "map" | "run" | "odom";
                 /** @description Version of the map, when the frame is `map`; the serving one unless said. */
                 version?: number;
+                /** @description Not before, nanoseconds. */
+                from_ns?: number;
+                /** @description Before, nanoseconds. */
+                to_ns?: number;
+                /**
+                 * @description Within this rectangle: `x,y,x,y` of two opposite corners, metres in `frame`.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+                /** @description Most poses to answer; all unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the answer before. */
+                cursor?: number;
             };
             header?: never;
             path: {
@@ -4167,6 +5039,7 @@ export interface operations {
                 };
             };
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
@@ -4208,6 +5081,7 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
             503: components["responses"]["ServiceUnavailable"];
         };
