@@ -32,6 +32,7 @@ from .example_evidence import ExampleEvidence
 from .example_place import ExamplePlace
 from .example_query import ExampleQuery
 from .geometry import Geometry
+from .get_grid_yaml_response_200 import GetGridYamlResponse200
 from .get_trajectory_frame import GetTrajectoryFrame
 from .get_trajectory_tum_frame import GetTrajectoryTumFrame
 from .grid import Grid
@@ -148,6 +149,7 @@ __all__ = (
     "ExamplePlace",
     "ExampleQuery",
     "Geometry",
+    "GetGridYamlResponse200",
     "GetTrajectoryFrame",
     "GetTrajectoryTumFrame",
     "Grid",

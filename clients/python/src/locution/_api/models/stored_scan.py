@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..types import UNSET, Unset
+
 if TYPE_CHECKING:
     from ..models.pose import Pose
 
@@ -27,12 +29,14 @@ class StoredScan:
             CBOR may also carry them as a typed array of RFC 8746 (tags 81, 82, 85, 86), or as one byte string of 32-bit
             floats,
             little endian, which is the quickest to read. Example: [2.31, 2.29, None].
+        angular_velocity_rad_per_s (float | None | Unset): As sent.
     """
 
     scan_seq: int
     timestamp_ns: int
     odom_from_robot: Pose
     ranges_m: list[float | None]
+    angular_velocity_rad_per_s: float | None | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -48,6 +52,12 @@ class StoredScan:
             componentsschemas_ranges_item = componentsschemas_ranges_item_data
             ranges_m.append(componentsschemas_ranges_item)
 
+        angular_velocity_rad_per_s: float | None | Unset
+        if isinstance(self.angular_velocity_rad_per_s, Unset):
+            angular_velocity_rad_per_s = UNSET
+        else:
+            angular_velocity_rad_per_s = self.angular_velocity_rad_per_s
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -58,6 +68,8 @@ class StoredScan:
                 "ranges_m": ranges_m,
             }
         )
+        if angular_velocity_rad_per_s is not UNSET:
+            field_dict["angular_velocity_rad_per_s"] = angular_velocity_rad_per_s
 
         return field_dict
 
@@ -85,11 +97,21 @@ class StoredScan:
 
             ranges_m.append(componentsschemas_ranges_item)
 
+        def _parse_angular_velocity_rad_per_s(data: object) -> float | None | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(float | None | Unset, data)
+
+        angular_velocity_rad_per_s = _parse_angular_velocity_rad_per_s(d.pop("angular_velocity_rad_per_s", UNSET))
+
         stored_scan = cls(
             scan_seq=scan_seq,
             timestamp_ns=timestamp_ns,
             odom_from_robot=odom_from_robot,
             ranges_m=ranges_m,
+            angular_velocity_rad_per_s=angular_velocity_rad_per_s,
         )
 
         stored_scan.additional_properties = d
