@@ -89,9 +89,8 @@ fn find_neighbors(
     span: Span<'_>,
 ) -> Result<Vec<Neighbors>, MappingError> {
     let config = graph.site.config;
-    let mut solver = graph.covariances()?;
-    let mut found = Vec::new();
     let mut nearby = Nearby::new(config.neighbor_distance_m + config.max_search_m);
+    let mut near_of: Vec<(AnchorIdx, Vec<AnchorIdx>)> = Vec::new();
     for (idx, &later) in graph.anchors().iter().enumerate() {
         span.done(idx, graph.anchors().len())?;
         let here = graph.pose(later);
@@ -100,12 +99,18 @@ fn find_neighbors(
         near.retain(|&earlier| distance_m(earlier) < nearby.reach_m && may_match(earlier, later));
         nearby.insert(later, &here);
         let near = nearest_of_each_pass(near, distance_m, config.max_passes);
-        let nodes: Vec<u32> = near.iter().map(|&earlier| graph.node(earlier) as u32).collect();
-        if nodes.is_empty() {
-            continue;
+        if !near.is_empty() {
+            near_of.push((later, near));
         }
-        let relatives = solver.relative_to_many(graph.node(later) as u32, &nodes)?;
-        for (&earlier, (later_from_earlier, covariance)) in near.iter().zip(relatives) {
+    }
+    let node = |anchor: AnchorIdx| graph.node(anchor) as u32;
+    let questions: Vec<(u32, Vec<u32>)> = (near_of.iter())
+        .map(|(later, near)| (node(*later), near.iter().map(|&earlier| node(earlier)).collect()))
+        .collect();
+    let relatives = graph.covariances()?.relatives(&questions)?;
+    let mut found = Vec::new();
+    for ((later, near), relatives) in near_of.into_iter().zip(relatives) {
+        for (earlier, (later_from_earlier, covariance)) in near.into_iter().zip(relatives) {
             let predicted = later_from_earlier.inverse();
             // The same uncertainty, seen from the earlier anchor; the lever of the heading matters little nearby.
             let covariance = crate::registration::rotated(&covariance, predicted.theta);

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_PI_4, PI};
 
 use super::run::RunRecord;
 use crate::geometry::{Pose2, angle_between};
+use crate::matching::claimed_between;
 use crate::text::{Direction, Interval};
 
 /// Two stretches that lie beside each other in the map.
@@ -79,7 +80,7 @@ pub(crate) fn find_stretches(
             }
             near.sort_unstable();
             let links = closest_of_each_pass(pose, &near, poses, settings);
-            growing = grow(growing, &links, (run_idx as u32, index as u32), settings, &mut finished);
+            growing = grow(growing, &links, (run_idx as u32, index as u32), settings, poses, &mut finished);
         }
         for (index, pose) in run_poses.iter().enumerate().skip(num_entered) {
             let cell = (components[run_idx], cell_of(pose.x), cell_of(pose.y));
@@ -104,17 +105,7 @@ fn closest_of_each_pass(
     for &(run_idx, observation) in near {
         let other = &poses[run_idx as usize][observation as usize];
         let distance_m = pose.distance(other);
-        let apart_rad = angle_between(pose.theta, other.theta);
-        let direction = if apart_rad <= FRAC_PI_4 {
-            Direction::Same
-        } else if apart_rad >= PI - FRAC_PI_4 {
-            Direction::Opposite
-        } else {
-            continue;
-        };
-        if distance_m > settings.distance_m {
-            continue;
-        }
+        let Some(direction) = direction_beside(pose, other, settings) else { continue };
         let continues = previous
             .is_some_and(|(run, last, way)| run == run_idx && way == direction && observation - last <= 5);
         previous = Some((run_idx, observation, direction));
@@ -132,30 +123,49 @@ fn closest_of_each_pass(
     links
 }
 
+/// The way in which two poses lie beside each other, if they do.
+fn direction_beside(pose: &Pose2, other: &Pose2, settings: &StretchSettings) -> Option<Direction> {
+    if pose.distance(other) > settings.distance_m {
+        return None;
+    }
+    match angle_between(pose.theta, other.theta) {
+        apart_rad if apart_rad <= FRAC_PI_4 => Some(Direction::Same),
+        apart_rad if apart_rad >= PI - FRAC_PI_4 => Some(Direction::Opposite),
+        _ => None,
+    }
+}
+
 /// Lengthens what continues, finishes what does not, begins what is new.
+///
+/// A stretch claims its pairs proportionally. Where a robot turns on the spot or cuts a corner, such a pair may be none
+/// although the links at both ends are: there it ends.
 fn grow(
     growing: Vec<Growing>,
     links: &[Link],
     (run_idx, index): (u32, u32),
     settings: &StretchSettings,
+    poses: &[Vec<Pose2>],
     finished: &mut Vec<Stretch>,
 ) -> Vec<Growing> {
     let mut is_used = vec![false; links.len()];
     let mut alive = Vec::new();
-    for mut old in growing {
+    for old in growing {
         let next =
             links.iter().enumerate().find(|(link_idx, link)| !is_used[*link_idx] && continues(&old, link));
-        let length = index - old.stretch.later.first;
-        match next {
-            Some((link_idx, link)) if length < settings.max_observations => {
+        let is_short = index - old.stretch.later.first < settings.max_observations;
+        let longer = next.filter(|_| is_short).map(|(link_idx, link)| {
+            let mut stretch = old.stretch;
+            stretch.later.last = index;
+            stretch.earlier.first = stretch.earlier.first.min(link.observation);
+            stretch.earlier.last = stretch.earlier.last.max(link.observation);
+            (link_idx, Growing { stretch, last: *link })
+        });
+        match longer.filter(|(_, longer)| holds(&longer.stretch, poses, settings)) {
+            Some((link_idx, longer)) => {
                 is_used[link_idx] = true;
-                old.stretch.later.last = index;
-                old.stretch.earlier.first = old.stretch.earlier.first.min(link.observation);
-                old.stretch.earlier.last = old.stretch.earlier.last.max(link.observation);
-                old.last = *link;
-                alive.push(old);
+                alive.push(longer);
             }
-            _ => finished.push(old.stretch),
+            None => finished.push(old.stretch),
         }
     }
     for (link, _) in links.iter().zip(&is_used).filter(|(_, used)| !**used) {
@@ -175,4 +185,70 @@ fn continues(growing: &Growing, link: &Link) -> bool {
         Direction::Opposite => -advance,
     };
     last.run_idx == link.run_idx && last.direction == link.direction && (0..=4).contains(&forward)
+}
+
+/// True when everything that a stretch claims lies beside each other and the way it says.
+fn holds(stretch: &Stretch, poses: &[Vec<Pose2>], settings: &StretchSettings) -> bool {
+    let Stretch { earlier, later, direction } = stretch;
+    let (earlier_poses, later_poses) = (&poses[earlier.run_idx as usize], &poses[later.run_idx as usize]);
+    claimed_between((earlier.first, earlier.last), (later.first, later.last), *direction).all(|pair| {
+        let (a, b) = (&later_poses[pair.later as usize], &earlier_poses[pair.earlier as usize]);
+        direction_beside(a, b, settings) == Some(*direction)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::ScanGeometry;
+    use crate::text::Observation;
+
+    const SETTINGS: StretchSettings =
+        StretchSettings { distance_m: 1.1, min_gap_m: 10.0, max_observations: 25 };
+
+    /// A run that stood at these poses, one a tenth of a metre.
+    fn observations(poses: &[Pose2]) -> Vec<Observation> {
+        let observation = |(index, pose): (usize, &Pose2)| Observation {
+            scan_seq: index as u64,
+            timestamp_ns: 0,
+            travel_m: index as f64 * 0.1,
+            odom_from_robot: *pose,
+            run_from_robot: *pose,
+            densities: vec![0.5],
+            is_hard: true,
+            num_frontiers: 0,
+        };
+        poses.iter().enumerate().map(observation).collect()
+    }
+
+    fn found(runs: &[Vec<Pose2>]) -> Vec<Stretch> {
+        let geometry = ScanGeometry {
+            num_ranges: 1,
+            angle_min_rad: 0.0,
+            angle_increment_rad: 0.1,
+            range_max_m: 10.0,
+            robot_from_laser: Pose2::identity(),
+        };
+        let driven: Vec<Vec<Observation>> = runs.iter().map(|poses| observations(poses)).collect();
+        let record =
+            |observations| RunRecord { geometry: &geometry, observations, words: &[], keyframes: &[] };
+        let records: Vec<RunRecord<'_>> = driven.iter().map(|run| record(run)).collect();
+        find_stretches(&records, runs, &vec![0; runs.len()], &SETTINGS)
+    }
+
+    #[test]
+    fn a_stretch_ends_where_one_of_its_pairs_would_face_another_way() {
+        let ahead = |index: i32| Pose2::new(f64::from(index) * 0.1, 0.0, 0.0);
+        let second: Vec<Pose2> = (0..40).map(ahead).collect();
+        // The first robot looked aside at one place; the second passed it looking ahead.
+        let mut first = second.clone();
+        (19..22).for_each(|index| first[index].theta = 0.9);
+        let runs = [first, second];
+        let stretches = found(&runs);
+        assert!(stretches.iter().all(|stretch| holds(stretch, &runs, &SETTINGS)), "{stretches:?}");
+        let is_claimed = |observation: u32| {
+            stretches.iter().any(|stretch| (stretch.later.first..=stretch.later.last).contains(&observation))
+        };
+        assert!((0..40).all(is_claimed), "{stretches:?}");
+    }
 }

@@ -27,6 +27,7 @@ mod normal_equations;
 mod optimizer;
 mod residual;
 mod robust;
+mod selected_inverse;
 mod spanning_tree;
 mod sparse_cholesky;
 mod support;
