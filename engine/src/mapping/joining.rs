@@ -207,9 +207,11 @@ fn judged<'a>(
     workshop: Workshop<'a>,
 ) -> Result<Verdict<'a>, MappingError> {
     let config = workshop.site.config;
+    let own = host.own_contradiction(workshop).min(guest.own_contradiction(workshop));
     let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
     for (idx, way) in different(ways, guest).into_iter().take(config.max_hypotheses).enumerate() {
-        let found = Component::laid_over(host, guest, way, workshop.part(idx, config.max_hypotheses))?;
+        let workshop = workshop.part(idx, config.max_hypotheses);
+        let found = Component::laid_over((host, guest), way, own, workshop)?;
         laid.extend(found.map(|(both, evidence)| (evidence, both)));
     }
     let (mut holding, others): (Vec<_>, Vec<_>) =

@@ -28,6 +28,8 @@ pub(crate) struct StretchSettings {
     pub min_gap_m: f64,
     /// Longest stretch, observations: short ones are proportional enough.
     pub max_observations: u32,
+    /// Passes of each direction with which one visit is matched.
+    pub max_passes: usize,
 }
 
 /// A pair of observations beside each other.
@@ -36,6 +38,7 @@ struct Link {
     run_idx: u32,
     observation: u32,
     direction: Direction,
+    distance_m: f64,
 }
 
 /// A stretch that may still grow.
@@ -45,15 +48,21 @@ struct Growing {
     last: Link,
 }
 
-type Cells = BTreeMap<(u32, i32, i32), Vec<(u32, u32)>>;
+/// A run and an observation of it.
+pub(crate) type Place = (u32, u32);
+
+type Cells = BTreeMap<(u32, i32, i32), Vec<Place>>;
 
 /// All stretches, in order of the later one.
 ///
-/// `poses` holds for each run the poses of its observations, `components` the frame in which they are given.
+/// `poses` holds for each run the poses of its observations, `components` the frame in which they are given. Of many
+/// passes beside a visit those come first that were registered with it, then those that lie nearest: a place that was
+/// driven a thousand times is worth no more matches than one that was driven twice.
 pub(crate) fn find_stretches(
     runs: &[RunRecord<'_>],
     poses: &[Vec<Pose2>],
     components: &[u32],
+    is_registered: &impl Fn(Place, Place) -> bool,
     settings: &StretchSettings,
 ) -> Vec<Stretch> {
     let cell_of = |value: f64| (value / settings.distance_m).floor() as i32;
@@ -79,8 +88,17 @@ pub(crate) fn find_stretches(
                 }
             }
             near.sort_unstable();
-            let links = closest_of_each_pass(pose, &near, poses, settings);
-            growing = grow(growing, &links, (run_idx as u32, index as u32), settings, poses, &mut finished);
+            let mut links = closest_of_each_pass(pose, &near, poses, settings);
+            let here = (run_idx as u32, index as u32);
+            if links.len() > settings.max_passes {
+                let rank =
+                    |link: &Link| (!is_registered((link.run_idx, link.observation), here), link.distance_m);
+                let mut ranked: Vec<((bool, f64), Link)> =
+                    links.iter().map(|link| (rank(link), *link)).collect();
+                ranked.sort_by(|(a, _), (b, _)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+                links = ranked.into_iter().map(|(_, link)| link).collect();
+            }
+            growing = grow(growing, &links, here, settings, poses, &mut finished);
         }
         for (index, pose) in run_poses.iter().enumerate().skip(num_entered) {
             let cell = (components[run_idx], cell_of(pose.x), cell_of(pose.y));
@@ -100,7 +118,6 @@ fn closest_of_each_pass(
     settings: &StretchSettings,
 ) -> Vec<Link> {
     let mut links: Vec<Link> = Vec::new();
-    let mut best_m = f64::INFINITY;
     let mut previous: Option<(u32, u32, Direction)> = None;
     for &(run_idx, observation) in near {
         let other = &poses[run_idx as usize][observation as usize];
@@ -109,15 +126,14 @@ fn closest_of_each_pass(
         let continues = previous
             .is_some_and(|(run, last, way)| run == run_idx && way == direction && observation - last <= 5);
         previous = Some((run_idx, observation, direction));
-        let link = Link { run_idx, observation, direction };
-        if !continues {
-            links.push(link);
-            best_m = distance_m;
-        } else if distance_m < best_m {
-            best_m = distance_m;
-            if let Some(last) = links.last_mut() {
-                *last = link;
+        let link = Link { run_idx, observation, direction, distance_m };
+        match links.last_mut() {
+            Some(last) if continues => {
+                if distance_m < last.distance_m {
+                    *last = link;
+                }
             }
+            _ => links.push(link),
         }
     }
     links
@@ -148,7 +164,7 @@ fn grow(
     finished: &mut Vec<Stretch>,
 ) -> Vec<Growing> {
     let mut is_used = vec![false; links.len()];
-    let mut alive = Vec::new();
+    let mut alive: Vec<Growing> = Vec::new();
     for old in growing {
         let next =
             links.iter().enumerate().find(|(link_idx, link)| !is_used[*link_idx] && continues(&old, link));
@@ -169,6 +185,10 @@ fn grow(
         }
     }
     for (link, _) in links.iter().zip(&is_used).filter(|(_, used)| !**used) {
+        let is_this_way = |growing: &&Growing| growing.stretch.direction == link.direction;
+        if alive.iter().filter(is_this_way).count() >= settings.max_passes {
+            continue;
+        }
         let earlier = Interval { run_idx: link.run_idx, first: link.observation, last: link.observation };
         let later = Interval { run_idx, first: index, last: index };
         let stretch = Stretch { earlier, later, direction: link.direction };
@@ -204,7 +224,7 @@ mod tests {
     use crate::text::Observation;
 
     const SETTINGS: StretchSettings =
-        StretchSettings { distance_m: 1.1, min_gap_m: 10.0, max_observations: 25 };
+        StretchSettings { distance_m: 1.1, min_gap_m: 10.0, max_observations: 25, max_passes: 2 };
 
     /// A run that stood at these poses, one a tenth of a metre.
     fn observations(poses: &[Pose2]) -> Vec<Observation> {
@@ -233,7 +253,9 @@ mod tests {
         let record =
             |observations| RunRecord { geometry: &geometry, observations, words: &[], keyframes: &[] };
         let records: Vec<RunRecord<'_>> = driven.iter().map(|run| record(run)).collect();
-        find_stretches(&records, runs, &vec![0; runs.len()], &SETTINGS)
+        // What the first run and the last saw of each other was registered.
+        let is_registered = |earlier: Place, _| earlier.0 == 0;
+        find_stretches(&records, runs, &vec![0; runs.len()], &is_registered, &SETTINGS)
     }
 
     #[test]
@@ -250,5 +272,21 @@ mod tests {
             stretches.iter().any(|stretch| (stretch.later.first..=stretch.later.last).contains(&observation))
         };
         assert!((0..40).all(is_claimed), "{stretches:?}");
+    }
+
+    #[test]
+    fn a_place_that_was_passed_often_is_matched_with_few_passes_and_with_those_that_were_registered() {
+        let pass = |aside_m: f64| (0..100).map(move |index| Pose2::new(f64::from(index) * 0.1, aside_m, 0.0));
+        // The registered pass lies farthest from the last one.
+        let runs: Vec<Vec<Pose2>> = (0..9).map(|run| pass(f64::from(run) * 0.1).collect()).collect();
+        let stretches = found(&runs);
+        let of_last: Vec<&Stretch> = stretches.iter().filter(|stretch| stretch.later.run_idx == 8).collect();
+        for observation in 0..100 {
+            let holds = |interval: &Interval| (interval.first..=interval.last).contains(&observation);
+            let matched: Vec<u32> = (of_last.iter().filter(|stretch| holds(&stretch.later)))
+                .map(|stretch| stretch.earlier.run_idx)
+                .collect();
+            assert!(matched.len() == 2 && matched.contains(&0), "{observation}: {matched:?}");
+        }
     }
 }

@@ -21,8 +21,10 @@ const FIRST_SEED: u64 = 500;
 #[derive(Clone, Debug, Serialize)]
 struct Grown {
     num_runs: usize,
-    /// Seconds of the build that adds the last run, and of weighing the texts after it.
+    /// Seconds of the build that adds the last run, of all cores together while it was made, and of weighing the texts
+    /// after it.
     seconds: f64,
+    core_seconds: f64,
     weighing_seconds: f64,
     resident_mib: f64,
     num_remembered: usize,
@@ -56,8 +58,9 @@ pub fn grow(num_runs: u64, world: &str) -> Result<(), Failure> {
     }
     let (at_once, grown) = built(&runs, &mut RegistrationMemo::default())?;
     println!(
-        "{num_runs} runs from nothing: {:.1} s, {} as run by run",
+        "{num_runs} runs from nothing: {:.1} s, {:.1} s of all cores together, {} as run by run",
         grown.seconds,
+        grown.core_seconds,
         if at_once == latest { "the same map" } else { "NOT the same map" }
     );
     Ok(())
@@ -66,15 +69,16 @@ pub fn grow(num_runs: u64, world: &str) -> Result<(), Failure> {
 fn built(runs: &[Driven], memo: &mut RegistrationMemo) -> Result<(SiteMap, Grown), Failure> {
     let records: Vec<RunRecord<'_>> = runs.iter().map(Driven::record).collect();
     let config = EngineConfig::default();
-    let began = Instant::now();
+    let (began, cores_before) = (Instant::now(), core_seconds());
     let map = map_site(&config.mapping, &records, &[], memo)?;
-    let seconds = began.elapsed().as_secs_f64();
+    let (seconds, core_seconds) = (began.elapsed().as_secs_f64(), core_seconds() - cores_before);
     let mut weighed = map.clone();
     weigh_texts(&records, &mut weighed, &config.matching);
     let is_verified = |state: MatchState| state == MatchState::Verified;
     let grown = Grown {
         num_runs: runs.len(),
         seconds,
+        core_seconds,
         weighing_seconds: began.elapsed().as_secs_f64() - seconds,
         resident_mib: resident_mib(),
         num_remembered: memo.len(),
@@ -111,4 +115,15 @@ fn resident_mib() -> f64 {
     let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
     let kib = line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok());
     kib.unwrap_or_default() / 1024.0
+}
+
+/// Seconds that this program has kept cores busy, whatever else the machine does; 0 where the system does not tell.
+fn core_seconds() -> f64 {
+    const TICKS_PER_SECOND: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // Behind the name, which may hold anything, user and system time are the twelfth and the thirteenth field.
+    let fields: Vec<&str> =
+        stat.rsplit_once(')').map_or(Vec::new(), |(_, fields)| fields.split_whitespace().collect());
+    let ticks = |field: &&str| field.parse::<f64>().unwrap_or_default();
+    fields.iter().skip(11).take(2).map(ticks).sum::<f64>() / TICKS_PER_SECOND
 }
