@@ -25,11 +25,13 @@ mod graph;
 mod information;
 mod normal_equations;
 mod optimizer;
+mod paths;
 mod residual;
 mod robust;
 mod spanning_tree;
 mod sparse_cholesky;
 mod support;
+mod surest_first;
 #[cfg(test)]
 mod testing;
 

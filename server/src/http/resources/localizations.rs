@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::batches::{BatchDto, ScanDto, checked_batch};
-use super::runs::GeometryDto;
+use super::runs::{GeometryDto, check_area};
 use crate::app::AppError;
-use crate::app::ask::{ExampleInfo, LocalizationInfo};
+use crate::app::ask::{Declared, ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
 use crate::elsewhere::Answers;
@@ -36,6 +36,10 @@ pub struct NewLocalizationDto {
     /// Where the robot is said to be when the session begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PosePriorDto>,
+    /// The area it is said to be in: only components with a run of this area are looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "second floor", min_length = 1, max_length = 256)]
+    pub area: Option<String>,
 }
 
 /// A rough pose that a person or another system declares. It is weighed, not believed.
@@ -324,8 +328,10 @@ pub async fn open_localization(
 ) -> Result<Response, ApiError> {
     let laser = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
+    check_area(new.area.as_ref())?;
+    let declared = Declared { prior, area: new.area };
     let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
-    let info = state.app.open_localization(&site, laser, prior, owner, num_own_max).await?;
+    let info = state.app.open_localization(&site, laser, declared, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }

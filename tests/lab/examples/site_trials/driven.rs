@@ -112,6 +112,7 @@ impl Driven {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: None,
         }
     }
 }
