@@ -331,14 +331,7 @@ impl ServerConfig {
             return invalid("limits.num_ranges_per_scan_max", "must be at most 65536");
         }
         self.storage.validate()?;
-        self.cluster.validate()?;
-        if self.storage.address.is_some() && self.cluster.url.is_none() && self.address.ip().is_unspecified()
-        {
-            return invalid(
-                "cluster.url",
-                "say where other servers reach this one, since `address` does not",
-            );
-        }
+        self.cluster.validate(self)?;
         if !(limits.odometry_step_max_m > 0.0 && limits.odometry_step_max_m.is_finite()) {
             return invalid("limits.odometry_step_max_m", "must be a positive number of metres");
         }

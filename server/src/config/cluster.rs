@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::ServerConfigError;
+use super::{ServerConfig, ServerConfigError};
 
 /// The servers that share an object store; without one this says nothing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,7 +23,8 @@ impl Default for ClusterConfig {
 }
 
 impl ClusterConfig {
-    pub(super) fn validate(&self) -> Result<(), ServerConfigError> {
+    /// Checks every value, by itself and beside the others of `config`.
+    pub(super) fn validate(&self, config: &ServerConfig) -> Result<(), ServerConfigError> {
         let invalid = |field: &str, problem: &str| {
             Err(ServerConfigError::Invalid { field: field.into(), problem: problem.into() })
         };
@@ -36,6 +37,12 @@ impl ClusterConfig {
         };
         if self.url.as_deref().is_some_and(|url| !is_base(url)) {
             return invalid("cluster.url", "must be like `http://host:port`, nothing behind");
+        }
+        if self.url.is_none() && config.storage.address.is_some() && config.address.ip().is_unspecified() {
+            return invalid(
+                "cluster.url",
+                "say where other servers reach this one, since `address` does not",
+            );
         }
         if !(self.lease_s >= 1.0 && self.lease_s <= 300.0) {
             return invalid("cluster.lease_s", "must lie between 1 and 300 seconds");
