@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::http::StatusCode;
-use axum::response::Response;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use locution_engine::geometry::Pose2;
 use locution_engine::locate::{Hypothesis, LocalizationState, Missing, PosePrior};
@@ -18,6 +18,7 @@ use crate::app::AppError;
 use crate::app::ask::{Declared, ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
+use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, IdOf, NoParams, Paged, SiteOf};
 use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto};
@@ -409,10 +410,20 @@ pub async fn query_example(
 pub async fn query_example_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
+    headers: HeaderMap,
     Body(query): Body<ExampleQueryDto>,
-) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
+) -> Result<impl IntoResponse, ApiError> {
     let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let elsewhere =
+        Answers::<ExampleAnswerDto>::to(&state, &identity, "/queries/example", &headers, &query).await?;
     let sites = state.app.sites(|name| identity.may_see(name)).await?;
     let answers = state.app.find_example(&sites, (&geometry, &readings), query.batch()?).await?;
-    Ok(Json(answers.into_iter().map(ExampleAnswerDto::from).collect()))
+    let unanswered = elsewhere.as_header();
+    let mut answers: Vec<_> = answers.into_iter().map(ExampleAnswerDto::from).collect();
+    if !elsewhere.found.is_empty() {
+        let best = |answer: &ExampleAnswerDto| answer.places.first().map_or(0.0, |place| place.probability);
+        answers.extend(elsewhere.found);
+        answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
+    }
+    Ok((unanswered, Json(answers)))
 }
