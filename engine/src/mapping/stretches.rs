@@ -250,8 +250,13 @@ mod tests {
             robot_from_laser: Pose2::identity(),
         };
         let driven: Vec<Vec<Observation>> = runs.iter().map(|poses| observations(poses)).collect();
-        let record =
-            |observations| RunRecord { geometry: &geometry, observations, words: &[], keyframes: &[] };
+        let record = |observations| RunRecord {
+            geometry: &geometry,
+            observations,
+            words: &[],
+            keyframes: &[],
+            area: None,
+        };
         let records: Vec<RunRecord<'_>> = driven.iter().map(|run| record(run)).collect();
         // What the first run and the last saw of each other was registered.
         let is_registered = |earlier: Place, _| earlier.0 == 0;
