@@ -137,6 +137,7 @@ impl Answer {
 impl Api {
     /// Speaks to a server.
     pub fn new(base: String) -> Self {
+        locution_client::choose_ciphers();
         Self { base, key: None, http: reqwest::Client::new() }
     }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use reqwest::header::{ACCEPT, AUTHORIZATION, CONTENT_TYPE, RETRY_AFTER};
 use reqwest::{Method, Response, StatusCode};
+use rustls::crypto::CryptoProvider;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use tokio::time::{Instant, sleep};
@@ -61,12 +62,22 @@ impl Body {
     }
 }
 
+/// Chooses the ciphers of TLS for this process, unless somebody has; `reqwest` makes no client before that.
+/// [`Client::new`] does it by itself.
+pub fn choose_ciphers() {
+    if CryptoProvider::get_default().is_none() {
+        // Another thread may have been faster, which is as good.
+        let _ = rustls::crypto::ring::default_provider().install_default();
+    }
+}
+
 impl Client {
     /// A client of the server at `base_url`, such as `http://127.0.0.1:7070`.
     ///
     /// # Errors
     /// The HTTP library cannot start.
     pub fn new(base_url: &str) -> Result<Self, ClientError> {
+        choose_ciphers();
         let http = reqwest::Client::builder()
             .connect_timeout(Duration::from_secs(10))
             .build()

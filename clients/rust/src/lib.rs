@@ -44,7 +44,7 @@ mod upload;
 #[cfg(test)]
 mod document_tests;
 
-pub use client::{Client, RetryPolicy};
+pub use client::{Client, RetryPolicy, choose_ciphers};
 pub use error::{ClientError, Problem};
 pub use events::Events;
 pub use maps::{MapAt, MapForm};
