@@ -242,22 +242,6 @@ fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2
             .any(|(center, half)| thing.iter().any(|cell| point_of(*cell).distance(center) <= NEAR_M + half))
     };
     let num_found = seen.iter().filter(|thing| is_listed(thing)).count();
-    if std::env::var_os("LIST").is_some() {
-        for ((change, right), center) in found.iter().zip(&is_right).zip(&centers) {
-            println!(
-                "{} {:?} {:.2} m2 at ({:.2}, {:.2}) size {:.2} x {:.2} confidence {:.2} density {:?}",
-                if *right { "right" } else { "WRONG" },
-                change.kind,
-                change.area_m2,
-                center.x,
-                center.y,
-                change.high.x - change.low.x,
-                change.high.y - change.low.y,
-                change.confidence,
-                change.density_change
-            );
-        }
-    }
     println!(
         "{} changes listed, {num_right} right: precision {:.3} ({:.3} of the surface); {} things of {THING_MIN_M2} m² \
          differ, {} were there to be seen, {num_found} found: recall {:.3}",

@@ -19,11 +19,6 @@ pub struct ChangesConfig {
     pub num_scans_min: u16,
     /// A cell is surely free when at most this share of its scans saw a return in it.
     pub free_share_max: f64,
-    /// Where a larger share of the scans than this, and more than one, saw a return, something stood that is only seen from
-    /// the side, or is thin: nothing that is near it in the other set has come or gone.
-    pub trace_share_min: f64,
-    /// Share of the scans of an area that saw a return in it: what only passed by left fewer.
-    pub hit_share_min: f64,
     /// Changed cells closer than this belong to one area, metres.
     pub join_m: f64,
     /// Areas with less than this surface of changed cells are noise, m².
@@ -39,8 +34,6 @@ impl Default for ChangesConfig {
             tolerance_m: 0.25,
             num_scans_min: 3,
             free_share_max: 0.05,
-            trace_share_min: 0.05,
-            hit_share_min: 0.4,
             join_m: 0.35,
             area_min_m2: 0.05,
             profile_radius_m: 1.5,
@@ -58,8 +51,6 @@ impl ChangesConfig {
         let values = [
             ("tolerance_m", self.tolerance_m, 0.0, 2.0),
             ("free_share_max", self.free_share_max, 0.0, 0.5),
-            ("trace_share_min", self.trace_share_min, 0.0, 1.0),
-            ("hit_share_min", self.hit_share_min, 0.0, 1.0),
             ("join_m", self.join_m, 0.0, 5.0),
             ("area_min_m2", self.area_min_m2, 0.0, 100.0),
             ("profile_radius_m", self.profile_radius_m, 0.0, 20.0),

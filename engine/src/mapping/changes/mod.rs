@@ -97,7 +97,7 @@ pub fn find_changes(
         let cells = changed_cells(occupied, free, config);
         for area in areas(&cells, config) {
             let mut change = describe(kind, &area, &cells, &new);
-            if change.area_m2 < config.area_min_m2 || hit_share(occupied, &area) < config.hit_share_min {
+            if change.area_m2 < config.area_min_m2 {
                 continue;
             }
             weigh_densities(&mut change, before, after, config);
@@ -138,7 +138,7 @@ fn changed_cells(
         (-radius..=radius).any(|dy| {
             (-radius..=radius).any(|dx| {
                 dx * dx + dy * dy <= radius * radius
-                    && is_trace(free.counts((cell.0 + dx, cell.1 + dy)), config)
+                    && is_occupied(free.counts((cell.0 + dx, cell.1 + dy)), config)
             })
         })
     };
@@ -161,13 +161,6 @@ fn num_scans(counts: CellCounts) -> u32 {
 fn is_occupied(counts: CellCounts, config: &ChangesConfig) -> bool {
     counts.num_hits > 0
         && f64::from(counts.num_hits) >= config.occupancy.occupied_share_min * f64::from(num_scans(counts))
-}
-
-/// Whether something may stand in a cell.
-fn is_trace(counts: CellCounts, config: &ChangesConfig) -> bool {
-    is_occupied(counts, config)
-        || counts.num_hits > 1
-            && f64::from(counts.num_hits) > config.trace_share_min * f64::from(num_scans(counts))
 }
 
 /// Share of the scans of some cells that saw a return in them.
