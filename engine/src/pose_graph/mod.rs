@@ -25,11 +25,14 @@ mod graph;
 mod information;
 mod normal_equations;
 mod optimizer;
+mod paths;
 mod residual;
 mod robust;
+mod selected_inverse;
 mod spanning_tree;
 mod sparse_cholesky;
 mod support;
+mod surest_first;
 #[cfg(test)]
 mod testing;
 

@@ -1,6 +1,8 @@
 //! Least squares that survives wrong constraints.
 //!
-//! Doubtful constraints get weights w in [0, 1] that multiply their information; solving and reweighting alternate.
+//! Where all constraints fit together nothing is doubted. Else they are first taken in one after the other, the surest
+//! first (`surest_first.rs`); what that cannot place is left out, unless it holds parts of the graph together. Then
+//! doubtful constraints get weights w in [0, 1] that multiply their information; solving and reweighting alternate.
 //!
 //! - *Graduated non-convexity* with truncated least squares: begin with a kernel so flat that the problem is nearly
 //!   ordinary least squares, sharpen it step by step, end with weights of 0 or 1.
@@ -10,17 +12,15 @@
 //! constraint is judged by how it fits the result, until nothing changes. Rejected constraints stay in the graph
 //! with their weight, so that a caller can show them.
 
-use nalgebra::Matrix3;
-
 use super::components::Components;
 use super::covariance::CovarianceSolver;
 use super::optimizer::Problem;
-use super::support::{Uncertain, find_backing};
+use super::support::find_backing;
+use super::surest_first::{Judge, Standing, judge_surest_first, pose_space};
 use super::{
     Kernel, Method, OptimizeReport, PoseConstraint, PoseGraph, PoseGraphConfig, PoseGraphError, RobustConfig,
     Start, Trust, optimize, spanning_tree_start,
 };
-use crate::geometry::Pose2;
 
 /// What robust optimisation did.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,13 @@ pub fn optimize_robust(
     choose_start(&mut started, config, robust);
     let backing = find_backing(&started, robust);
     let bound = robust.inlier_chi2_max * backing.covariance_scale;
-    let is_candidate = candidates(&started, backing.is_backed);
+    let is_candidate = if all_fit(&mut started, config, bound) {
+        vec![true; num_constraints]
+    } else {
+        let given = PoseGraphConfig { start: Start::Given, ..config.clone() };
+        let standings = judge_surest_first(&mut started, &given, bound, robust.support_steps_max)?;
+        candidates(&started, &backing.is_backed, &standings)
+    };
     let candidate_graph = started.with_constraints(|index| is_candidate[index]);
     let mut reweighting = Reweighting::new(&candidate_graph, robust, bound)?;
     let num_solves = reweighting.run()?;
@@ -89,18 +95,44 @@ pub fn optimize_robust(
     })
 }
 
-/// The constraints that take part in the reweighting: those that a neighbour backs, and those without which parts of
-/// the graph would not hang together; all of them when none is backed.
-fn candidates(graph: &PoseGraph, is_backed: Vec<bool>) -> Vec<bool> {
-    let any_backed =
-        graph.trusts().iter().zip(&is_backed).any(|(&trust, &backed)| backed && trust == Trust::Doubtful);
-    if !any_backed {
-        return vec![true; is_backed.len()];
+/// Whether nothing need be doubted: all constraints fit the solution with all of them, to which the poses then move.
+fn all_fit(graph: &mut PoseGraph, config: &PoseGraphConfig, bound: f64) -> bool {
+    let mut solved = graph.clone();
+    let fits = |solved: &PoseGraph| {
+        let is_doubtful = |index: &usize| solved.trusts()[*index] == Trust::Doubtful;
+        let mut doubtful = (0..solved.constraints().len()).filter(is_doubtful);
+        doubtful.all(|index| solved.constraint_chi2(index as u32).is_some_and(|chi2| chi2 <= bound))
+    };
+    // A graph without wrong constraints needs few; with many of them each is dear, since they tie all to all.
+    let few = PoseGraphConfig {
+        max_iterations: config.max_iterations.min(ITERATIONS_WITHOUT_DOUBT),
+        ..config.clone()
+    };
+    let all_fit = optimize(&mut solved, &few).is_ok() && fits(&solved);
+    if all_fit {
+        *graph = solved;
     }
-    let components = Components::of(graph, |index| is_backed[index]);
+    all_fit
+}
+
+/// The constraints that take part in the reweighting: those accepted, and of those that are still open the ones without
+/// which parts of the graph would not hang together. Where no doubtful one could be accepted they are those that a
+/// neighbour backs, or all that are open when none is backed.
+fn candidates(graph: &PoseGraph, is_backed: &[bool], standings: &[Standing]) -> Vec<bool> {
+    let all = || graph.constraints().iter().enumerate();
+    let is_open = |index: usize| standings[index] == Standing::Open;
+    let has_accepted = all()
+        .any(|(index, _)| standings[index] == Standing::Accepted && graph.trusts()[index] == Trust::Doubtful);
+    let any_backed = all().any(|(index, _)| is_open(index) && is_backed[index]);
+    let is_sure = |index: usize| match standings[index] {
+        Standing::Accepted => true,
+        Standing::Refuted => false,
+        Standing::Open => !has_accepted && (!any_backed || is_backed[index]),
+    };
+    let components = Components::of(graph, is_sure);
     let component_of = |pose: u32| components.component_of_pose[pose as usize];
-    let joins = graph.constraints().iter().map(|c| component_of(c.i) != component_of(c.j));
-    is_backed.iter().zip(joins).map(|(&backed, joins)| backed || joins).collect()
+    let joins = |constraint: &PoseConstraint| component_of(constraint.i) != component_of(constraint.j);
+    all().map(|(index, constraint)| is_sure(index) || is_open(index) && joins(constraint)).collect()
 }
 
 /// Keeps the given poses unless the chain of trusted constraints has the smaller truncated cost.
@@ -249,7 +281,10 @@ fn judge(
     }
 }
 
-fn solve_accepted(graph: &mut PoseGraph, config: &PoseGraphConfig) -> Result<OptimizeReport, PoseGraphError> {
+pub(super) fn solve_accepted(
+    graph: &mut PoseGraph,
+    config: &PoseGraphConfig,
+) -> Result<OptimizeReport, PoseGraphError> {
     match optimize(graph, config) {
         Err(PoseGraphError::NotPositiveDefinite { .. }) => {
             optimize(graph, &PoseGraphConfig { method: Method::LevenbergMarquardt, ..config.clone() })
@@ -269,7 +304,8 @@ fn verdicts(
     is_accepted: &[bool],
     bound: f64,
 ) -> Result<Vec<bool>, PoseGraphError> {
-    let mut gate = Gate { solver: CovarianceSolver::new(accepted)?, bound, space: pose_space(graph) };
+    let solver = CovarianceSolver::new(accepted)?;
+    let mut judge = Judge { solver, bound, chance_max: CHANCE_MAX, space: pose_space(graph) };
     let mut verdicts = Vec::with_capacity(is_accepted.len());
     for (index, constraint) in graph.constraints().iter().enumerate() {
         let is_right = if graph.trusts()[index] == Trust::Trusted {
@@ -278,53 +314,15 @@ fn verdicts(
             let chi2 = graph.constraint_chi2(index as u32);
             chi2.is_some_and(|chi2| chi2 <= TOLERANCE_OF_ACCEPTED * bound)
         } else {
-            gate.admits(constraint)
+            judge.admits(constraint)
         };
         verdicts.push(is_right);
     }
     Ok(verdicts)
 }
 
-/// Measures rejected constraints against what the graph believes without them.
-struct Gate {
-    solver: CovarianceSolver,
-    bound: f64,
-    /// Size of the space of relative poses, m² rad.
-    space: f64,
-}
-
-impl Gate {
-    fn admits(&mut self, constraint: &PoseConstraint) -> bool {
-        let Some(measured) = Uncertain::of(constraint) else { return false };
-        let fits = |(pose, covariance): (Pose2, Matrix3<f64>), bound: f64| {
-            Uncertain { pose, covariance }.chi2_against(&measured).is_some_and(|chi2| chi2 <= bound)
-        };
-        // Most wrong constraints fail even the test that needs no solve.
-        let could_fit =
-            self.solver.relative_bound(constraint.i, constraint.j).is_ok_and(|r| fits(r, self.bound));
-        if !could_fit {
-            return false;
-        }
-        let Ok(believed) = self.solver.relative(constraint.i, constraint.j) else { return false };
-        let tolerated = (believed.1 + measured.covariance) * self.bound;
-        let volume = 4.0 / 3.0 * std::f64::consts::PI * tolerated.determinant().max(0.0).sqrt();
-        volume <= CHANCE_MAX * self.space && fits(believed, self.bound)
-    }
-}
-
-/// Size of the space of relative poses in this map: its bounding box times all headings, m² rad.
-fn pose_space(graph: &PoseGraph) -> f64 {
-    let extent = |coordinate: fn(&Pose2) -> f64| {
-        let (low, high) = graph
-            .poses()
-            .iter()
-            .map(coordinate)
-            .fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
-        high - low
-    };
-    extent(|pose| pose.x) * extent(|pose| pose.y) * std::f64::consts::TAU
-}
-
+/// Linear solves with all constraints before any is doubted.
+const ITERATIONS_WITHOUT_DOUBT: u32 = 6;
 /// χ² up to this multiple of the bound is forgiven to a constraint that was accepted.
 const TOLERANCE_OF_ACCEPTED: f64 = 4.0;
 /// A rejected constraint is not taken back where one at random would pass with this probability.
@@ -334,6 +332,7 @@ const CHANCE_MAX: f64 = 0.01;
 mod tests {
     use super::super::testing::{constraint, random_drive, random_pose};
     use super::*;
+    use crate::geometry::Pose2;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
 

@@ -102,7 +102,7 @@ pub(super) struct Uncertain {
 }
 
 impl Uncertain {
-    const EXACT: Self =
+    pub const EXACT: Self =
         Self { pose: Pose2::identity(), covariance: Matrix3::new(0., 0., 0., 0., 0., 0., 0., 0., 0.) };
 
     /// `None` when the constraint does not determine all of the relative pose.

@@ -97,14 +97,11 @@ function posed(layer: Layer, pose: Pose): Layer {
   };
 }
 
-function boundsOf({ map, component }: Version): Bounds {
-  const bounds = new Bounds();
+function boundsOf({ map, grid, component }: Version): Bounds {
+  const bounds = grid.bounds;
   for (const run of map.runs) {
     if (run.component !== component) continue;
-    for (const pose of run.poses) {
-      bounds.add(pose.x - 4, pose.y - 4);
-      bounds.add(pose.x + 4, pose.y + 4);
-    }
+    for (const pose of run.poses) bounds.add(pose.x, pose.y);
   }
   return bounds;
 }

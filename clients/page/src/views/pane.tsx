@@ -85,19 +85,24 @@ function useView(state: SiteState, canvas: { current: HTMLCanvasElement | null }
   const { stage, map, component, site } = state;
   const bounds = useMemo(() => boundsOf(state, grid), [map, component, grid]);
   const shown = useRef("");
+  const asked = usePlace().query.get("at");
+  const written = useRef(asked);
+  const timer = useRef(0);
   useEffect(() => {
     if (!canvas.current) return;
     const view = new MapView(canvas.current);
     stage.view = view;
-    let timer = 0;
     view.onCamera = (camera) => {
       set.setScale(camera.scale);
-      window.clearTimeout(timer);
-      timer = window.setTimeout(() => patch({ at: cameraText(camera) }), 300);
+      window.clearTimeout(timer.current);
+      timer.current = window.setTimeout(() => {
+        written.current = cameraText(camera);
+        patch({ at: written.current });
+      }, 300);
     };
     view.onPoint = set.setPointer;
     return () => {
-      window.clearTimeout(timer);
+      window.clearTimeout(timer.current);
       view.end();
       stage.view = undefined;
     };
@@ -112,16 +117,25 @@ function useView(state: SiteState, canvas: { current: HTMLCanvasElement | null }
       set.setNote(hit?.kind === "match" ? undefined : hit);
     };
     const name = `${site}/${component}`;
-    const asked = cameraOf(placeNow().query.get("at"));
+    const camera = cameraOf(placeNow().query.get("at"));
     if (map && shown.current !== name) {
       // The first time the address decides, then what there is to see.
-      if (asked) view.camera = asked;
+      if (camera) view.camera = camera;
       else view.fit(false);
       set.setScale(view.camera.scale);
       // The path is there before the walls, which belong into the picture too.
       if (grid) shown.current = name;
     }
   }, [stage.view, bounds, site, component]);
+  useEffect(() => {
+    // An address that was not written here is a link that was followed.
+    const camera = asked === written.current ? undefined : cameraOf(asked);
+    written.current = asked;
+    if (!camera || !stage.view) return;
+    window.clearTimeout(timer.current);
+    stage.view.camera = camera;
+    set.setScale(camera.scale);
+  }, [asked]);
 }
 
 function boundsOf({ map, component }: SiteState, grid: Grid | undefined): Bounds {

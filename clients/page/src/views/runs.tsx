@@ -110,7 +110,7 @@ export function Uploads({ site, onDone }: { site: string; onDone: () => void }) 
           {sent ? (
             <Progress value={sent.numScans / recording.scans.length} label={`${run}: ${count(sent.numScans)} of ${count(recording.scans.length)} scans${sent.receipt ? `, ${count(sent.receipt.num_words)} words` : ""}`} />
           ) : (
-            <Field label="Name of the run" value={run} pattern="[A-Za-z0-9_-][A-Za-z0-9._-]*" maxLength={64} onInput={(event) => change(idx, { run: event.currentTarget.value })} />
+            <Field label="Name of the run" value={run} pattern="[A-Za-z0-9_\-][A-Za-z0-9._\-]*" maxLength={64} onInput={(event) => change(idx, { run: event.currentTarget.value })} />
           )}
         </div>
       ))}

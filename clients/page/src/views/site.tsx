@@ -1,7 +1,7 @@
 // A site: its views beside its map.
 
 import { useEffect, useMemo } from "preact/hooks";
-import { api, isStatus } from "../api";
+import { api } from "../api";
 import type { Schemas } from "../api";
 import { useCell, useLoaded } from "../cell";
 import { addressOf, patch, usePlace } from "../place";
@@ -41,12 +41,10 @@ export function SitePage({ site }: { site: string }) {
   const jobs = useJobs(site);
   const map = useLoaded(
     async (signal) => {
-      try {
-        return await api.get("/v1/sites/{site}/map", { path: { site }, query: asked ? { version: Number(asked) } : {}, signal });
-      } catch (error) {
-        if (isStatus(error, 409)) return undefined;
-        throw error;
-      }
+      // A site without a map refuses to show one, so the site is asked first whether it has any.
+      const { map_version: newest } = await api.get("/v1/sites/{site}", { path: { site }, signal });
+      if (!newest) return undefined;
+      return api.get("/v1/sites/{site}/map", { path: { site }, query: asked ? { version: Number(asked) } : {}, signal });
     },
     `${site} ${asked ?? ""}`,
   );

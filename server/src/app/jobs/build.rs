@@ -49,6 +49,7 @@ impl LoadedRun {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: self.run.record.area.as_deref(),
         }
     }
 }
