@@ -347,7 +347,13 @@ mod tests {
         let geometry = geometry();
         let records: Vec<RunRecord<'_>> = runs
             .iter()
-            .map(|(keyframes, _)| RunRecord { geometry: &geometry, observations: &[], words: &[], keyframes })
+            .map(|(keyframes, _)| RunRecord {
+                geometry: &geometry,
+                observations: &[],
+                words: &[],
+                keyframes,
+                area: None,
+            })
             .collect();
         let mapped =
             runs.iter().map(|(_, poses)| MappedRun { component: 0, map_from_keyframes: poses.clone() });
