@@ -60,6 +60,7 @@ impl Driven {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: None,
         }
     }
 
@@ -119,6 +120,21 @@ fn two_robots() -> (Driven, Driven) {
     let once_round = [(4.0, 2.0), (27.5, 2.0), (28.0, 18.0), (2.0, 18.0), (2.0, 2.0), (14.0, 2.0)];
     let other_way = [(25.0, 18.0), (28.0, 16.0), (28.0, 2.0), (2.0, 2.0), (2.0, 14.0)];
     (Driven::new(&world, &once_round, 3), Driven::new(&world, &other_way, 4))
+}
+
+#[test]
+fn runs_of_different_areas_are_never_joined_whatever_they_see() {
+    let (first, second) = two_robots();
+    let in_areas = |areas: [Option<&'static str>; 2]| {
+        let records = [&first, &second].map(Driven::record);
+        let records: Vec<RunRecord<'_>> =
+            records.into_iter().zip(areas).map(|(record, area)| RunRecord { area, ..record }).collect();
+        let mut memo = RegistrationMemo::default();
+        map_site(&EngineConfig::default().mapping, &records, &[], &mut memo).unwrap()
+    };
+    assert_eq!(in_areas([Some("first floor"), Some("second floor")]).num_components, 2);
+    assert_eq!(in_areas([Some("first floor"), Some("first floor")]).num_components, 1);
+    assert_eq!(in_areas([Some("first floor"), None]).num_components, 1);
 }
 
 #[test]

@@ -8,18 +8,27 @@ use figment::providers::{Env, Format, Serialized, Toml};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+mod cluster;
+mod storage;
+
+pub use cluster::ClusterConfig;
+pub use storage::{ObjectStoreConfig, StorageConfig};
+
 /// Everything the server can be told.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ServerConfig {
     /// Where to listen. Anything but a loopback address needs at least one key.
     pub address: SocketAddr,
-    /// Directory of the embedded storage; made when missing.
+    /// Directory of the embedded storage; made when missing. With an object store only keys made by the API are kept there.
     pub data_directory: PathBuf,
     /// Bounds on requests and queues.
     pub limits: LimitsConfig,
-    /// The embedded storage.
+    /// Where everything is kept; `storage = "s3://BUCKET/PREFIX"` is short for `storage.address`.
+    #[serde(deserialize_with = "storage::address_or_table")]
     pub storage: StorageConfig,
+    /// The servers that share an object store.
+    pub cluster: ClusterConfig,
     /// Background work.
     pub builds: BuildsConfig,
     /// What goes to the log.
@@ -40,6 +49,7 @@ impl Default for ServerConfig {
             data_directory: PathBuf::from("locution-data"),
             limits: LimitsConfig::default(),
             storage: StorageConfig::default(),
+            cluster: ClusterConfig::default(),
             builds: BuildsConfig::default(),
             log: LogConfig::default(),
             tls: None,
@@ -127,22 +137,6 @@ impl Default for LimitsConfig {
             num_event_streams_max: 64,
             request_timeout_s: 600,
         }
-    }
-}
-
-/// The embedded storage.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StorageConfig {
-    /// Bytes of pages that each open site may keep in memory.
-    pub cache_bytes_per_site: u64,
-    /// A run's translator is stored with its state after this many scans, so that resuming translates fewer again.
-    pub num_scans_per_checkpoint: u64,
-}
-
-impl Default for StorageConfig {
-    fn default() -> Self {
-        Self { cache_bytes_per_site: 32 << 20, num_scans_per_checkpoint: 1_000 }
     }
 }
 
@@ -336,9 +330,8 @@ impl ServerConfig {
         if limits.num_ranges_per_scan_max > 65_536 {
             return invalid("limits.num_ranges_per_scan_max", "must be at most 65536");
         }
-        if self.storage.num_scans_per_checkpoint == 0 {
-            return invalid("storage.num_scans_per_checkpoint", "must be at least 1");
-        }
+        self.storage.validate()?;
+        self.cluster.validate(self)?;
         if !(limits.odometry_step_max_m > 0.0 && limits.odometry_step_max_m.is_finite()) {
             return invalid("limits.odometry_step_max_m", "must be a positive number of metres");
         }
@@ -376,8 +369,8 @@ impl ServerConfig {
 
 /// Variables that begin with the name of a field. Others of the prefix belong to other tools, such as the tests.
 fn environment() -> Env {
-    const FIELDS: [&str; 9] =
-        ["address", "data_directory", "limits", "storage", "builds", "log", "tls", "web", "keys"];
+    const FIELDS: [&str; 10] =
+        ["address", "data_directory", "limits", "storage", "cluster", "builds", "log", "tls", "web", "keys"];
     let is_ours = |key: &figment::value::UncasedStr| {
         let key = key.as_str().to_ascii_lowercase();
         FIELDS.iter().any(|field| key == *field || key.starts_with(&format!("{field}__")))

@@ -158,6 +158,10 @@ impl From<AppError> for ApiError {
             AppError::Invalid { field, is_scan: true, .. } => Self::invalid_scan(field, detail),
             AppError::Invalid { field, .. } => Self::invalid(field, detail),
             AppError::NotReady { .. } => Self::new(StatusCode::CONFLICT, "not-ready", "Not ready", detail),
+            AppError::Elsewhere => {
+                Self::new(StatusCode::SERVICE_UNAVAILABLE, "moving", "Service unavailable", detail)
+                    .retry_after(1)
+            }
             AppError::Busy { retry_after, .. } => {
                 Self::new(StatusCode::TOO_MANY_REQUESTS, "busy", "Too many requests", detail)
                     .retry_after(retry_after.as_secs().max(1))

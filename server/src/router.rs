@@ -19,6 +19,7 @@ use utoipa_swagger_ui::SwaggerUi;
 
 use crate::auth;
 use crate::config::WebConfig;
+use crate::elsewhere;
 use crate::error::ApiError;
 use crate::http::routes::routes;
 use crate::http::{nanoseconds, openapi, page, with_version};
@@ -34,6 +35,7 @@ pub fn build_router(state: AppState) -> Router {
     let (routes, _) = routes().split_for_parts();
     routes
         .method_not_allowed_fallback(async || ApiError::of_status(StatusCode::METHOD_NOT_ALLOWED))
+        .layer(middleware::from_fn_with_state(state.elsewhere.clone(), elsewhere::forward))
         .layer(middleware::from_fn_with_state(Arc::clone(&state.gate), auth::identify))
         .with_state(state)
         .route("/", get(async || Redirect::temporary("/ui")))

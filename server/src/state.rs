@@ -6,6 +6,7 @@ use metrics_exporter_prometheus::PrometheusHandle;
 
 use crate::app::App;
 use crate::auth::Gate;
+use crate::elsewhere::Elsewhere;
 use crate::intake::Places;
 
 /// Shared by all requests.
@@ -15,6 +16,8 @@ pub struct AppState {
     pub app: Arc<App>,
     /// Who may come in.
     pub gate: Arc<Gate>,
+    /// The other servers, when several share a store.
+    pub elsewhere: Option<Arc<dyn Elsewhere>>,
     /// Room for requests.
     pub places: Arc<Places>,
     /// What `/metrics` prints.

@@ -175,7 +175,9 @@ fn the_page_on_configuration_names_every_key() {
         ..ApiKeyConfig::default()
     };
     let tls = TlsConfig { certificate: "chain.pem".into(), key: "key.pem".into() };
-    let config = ServerConfig { tls: Some(tls), ..ServerConfig::default() };
+    let mut config = ServerConfig { tls: Some(tls), ..ServerConfig::default() };
+    config.storage.address = Some("s3://maps/fleet".into());
+    config.cluster.url = Some("http://10.0.0.7:7070".into());
     let mut paths = Vec::new();
     paths_of(&serde_json::to_value(&config).unwrap(), "", &mut paths);
     paths.retain(|path| path != "keys");

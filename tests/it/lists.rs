@@ -234,6 +234,27 @@ async fn localizations_are_listed_with_their_expiry() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_run_says_where_it_belongs_and_a_session_looks_only_there() {
+    let server = TestServer::start().await;
+    let api = &server.api;
+    post_run(api, "somewhere", 400, 1).await;
+    build(api).await;
+    let upstairs = json!({"robot": "r1", "geometry": geometry(), "area": "upstairs"});
+    let made = api.put("/v1/sites/a/runs/above", &upstairs).await.ok();
+    assert_eq!(made["area"], "upstairs");
+    assert_eq!(api.put("/v1/sites/a/runs/above", &upstairs).await.ok()["area"], "upstairs");
+    let elsewhere = json!({"robot": "r1", "geometry": geometry(), "area": "downstairs"});
+    api.put("/v1/sites/a/runs/above", &elsewhere).await.problem(409, "exists");
+    let nowhere = json!({"robot": "r1", "geometry": geometry(), "area": ""});
+    assert_eq!(api.put("/v1/sites/a/runs/x", &nowhere).await.problem(422, "invalid-value")["field"], "area");
+    let problem = api.post("/v1/sites/a/localisations", &upstairs).await;
+    assert_eq!(problem.problem(422, "invalid-value")["field"], "area");
+    let anywhere = json!({"robot": "r1", "geometry": geometry()});
+    assert_eq!(api.post("/v1/sites/a/localisations", &anywhere).await.ok()["state"], "lost");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_site_can_be_changed_and_a_run_forgotten() {
     let server = TestServer::start().await;
     let api = &server.api;

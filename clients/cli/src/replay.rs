@@ -51,6 +51,9 @@ pub struct ReplayArguments {
     /// Name of the robot [default: the name of the file].
     #[arg(long)]
     robot: Option<String>,
+    /// Where the runs belong, for instance a floor; they are never joined to runs of another area.
+    #[arg(long)]
+    area: Option<String>,
     /// Name of the run, when there is one file [default: the name of the file].
     #[arg(long)]
     run: Option<String>,
@@ -134,6 +137,7 @@ async fn replay(arguments: &ReplayArguments, recordings: &[Recording]) -> Result
         num_scans_per_batch: arguments.batch,
         rate: arguments.rate,
         is_finishing: !arguments.keep_open,
+        area: arguments.area.clone(),
     };
     // One after the other, since a site's runs are ordered by when they were made.
     let mut opened: Vec<(&Recording, RunUpload)> = Vec::new();

@@ -31,10 +31,19 @@ pub struct ServeArguments {
     #[arg(long)]
     #[serde(skip_serializing_if = "Option::is_none")]
     data_directory: Option<PathBuf>,
+    /// `s3://BUCKET/PREFIX` of an object store, in place of the data directory.
+    #[arg(long)]
+    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "as_address")]
+    storage: Option<String>,
     /// Print the effective configuration as TOML and exit.
     #[arg(long)]
     #[serde(skip)]
     print_config: bool,
+}
+
+/// As one field of the table, so that the flag leaves what a file says of the others.
+fn as_address<S: serde::Serializer>(address: &Option<String>, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map([("address", address)])
 }
 
 /// Serves until interrupted.

@@ -11,7 +11,7 @@ use locution_engine::formats::CarmenLog;
 use crate::wire::{wire_geometry, wire_scan};
 
 /// How recordings are posted.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct UploadOptions {
     /// How scans travel.
     pub encoding: Encoding,
@@ -21,11 +21,19 @@ pub struct UploadOptions {
     pub rate: Option<f64>,
     /// Whether the run is finished when all scans are posted.
     pub is_finishing: bool,
+    /// Where the runs belong, when somebody said.
+    pub area: Option<String>,
 }
 
 impl Default for UploadOptions {
     fn default() -> Self {
-        Self { encoding: Encoding::Json, num_scans_per_batch: 100, rate: None, is_finishing: true }
+        Self {
+            encoding: Encoding::Json,
+            num_scans_per_batch: 100,
+            rate: None,
+            is_finishing: true,
+            area: None,
+        }
     }
 }
 
@@ -142,7 +150,8 @@ pub async fn open_run(
     log: &CarmenLog,
     options: &UploadOptions,
 ) -> Result<RunUpload> {
-    let new_run = NewRun { robot: Some(robot.to_owned()), geometry: wire_geometry(&log.geometry) };
+    let geometry = wire_geometry(&log.geometry);
+    let new_run = NewRun { robot: Some(robot.to_owned()), geometry, area: options.area.clone() };
     let upload = client.start_upload(site, run, &new_run, options.encoding).await;
     upload.with_context(|| format!("run {run} cannot be opened"))
 }

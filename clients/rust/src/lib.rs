@@ -10,7 +10,7 @@
 //!
 //! let client = Client::new("http://127.0.0.1:7070")?;
 //! client.put_site("office", None).await?;
-//! let run = NewRun { robot: Some("robot-1".into()), geometry };
+//! let run = NewRun { robot: Some("robot-1".into()), geometry, area: None };
 //! let mut upload = client.start_upload("office", "monday", &run, Encoding::Cbor).await?;
 //! // After an interruption the upload begins where the server's copy ends.
 //! for batch in scans[upload.next_sequence() as usize..].chunks(100) {

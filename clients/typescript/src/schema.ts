@@ -1672,6 +1672,11 @@ export interface components {
             /** @description The laser. */
             geometry: components["schemas"]["Geometry"];
             prior?: components["schemas"]["PosePrior"] | null;
+            /**
+             * @description The area it is said to be in: only components with a run of this area are looked at.
+             * @example second floor
+             */
+            area?: string | null;
         };
         /** @description Makes a run. */
         NewRun: {
@@ -1682,6 +1687,12 @@ export interface components {
             robot?: string | null;
             /** @description The laser. */
             geometry: components["schemas"]["Geometry"];
+            /**
+             * @description Where the run belongs, for instance a floor: it is never joined to runs of another area. Floors that look alike
+             *     cannot be told apart by a laser.
+             * @example second floor
+             */
+            area?: string | null;
         };
         /** @description Makes a site. */
         NewSite: {
@@ -1998,6 +2009,8 @@ export interface components {
             run: string;
             /** @description The robot. */
             robot?: string | null;
+            /** @description Where it belongs, when the client said. */
+            area?: string | null;
             /** @description The laser. */
             geometry: components["schemas"]["Geometry"];
             /** @description Whether it takes more scans. */

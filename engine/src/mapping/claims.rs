@@ -1,6 +1,6 @@
 //! From the finished map to matches with their evidence, told of the runs in the order in which they were given.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::Matrix3;
 
@@ -11,14 +11,19 @@ use super::place_match::{Channel, Evidence, MatchState, PlaceMatch, Registration
 use super::refusals::Refusal;
 use super::run::RunRecord;
 use super::site_anchors::SiteAnchors;
-use super::stretches::Stretch;
+use super::stretches::{Place, Stretch};
 use crate::text::{Direction, Interval, Observation};
 
 /// Closures by their anchors, with the component whose graph keeps them.
 pub(crate) struct ClosureIndex<'a> {
     site: &'a SiteAnchors<'a>,
     closures: BTreeMap<(AnchorIdx, AnchorIdx), (&'a Closure, &'a Component<'a>)>,
+    /// Pairs of anchors of which one lies near the one end of a closure and the other near its other end.
+    near: BTreeSet<(AnchorIdx, AnchorIdx)>,
 }
+
+/// Closures up to so many anchors along from both sides of a stretch speak for it.
+const NUM_ANCHORS_BESIDE: usize = 2;
 
 impl<'a> ClosureIndex<'a> {
     /// All closures of a map.
@@ -29,7 +34,24 @@ impl<'a> ClosureIndex<'a> {
                 .iter()
                 .map(move |closure| ((closure.earlier, closure.later), (closure, component)))
         };
-        Self { site, closures: components.iter().flat_map(of).collect() }
+        let closures: BTreeMap<_, _> = components.iter().flat_map(of).collect();
+        let mut near = BTreeSet::new();
+        for (earlier, later) in closures.keys() {
+            for a in site.beside(*earlier, NUM_ANCHORS_BESIDE).map(AnchorIdx::new) {
+                near.extend(site.beside(*later, NUM_ANCHORS_BESIDE).map(|b| (a, AnchorIdx::new(b))));
+            }
+        }
+        Self { site, closures, near }
+    }
+
+    /// True when two places, told by run and observation, were registered with each other or right beside.
+    pub fn is_registered(&self, a: Place, b: Place) -> bool {
+        let anchor = |(run, observation): Place| {
+            let run = self.site.run_told(run as usize)?;
+            self.site.nearest(run, self.site.travel_at(run, observation)?)
+        };
+        let pair = anchor(a).zip(anchor(b));
+        pair.is_some_and(|(a, b)| self.near.contains(&(a, b)) || self.near.contains(&(b, a)))
     }
 
     /// The match that a stretch of the map amounts to.
@@ -67,8 +89,7 @@ impl<'a> ClosureIndex<'a> {
         let around = |interval: &Interval| {
             let run = self.site.run_told(interval.run_idx as usize)?;
             let (anchor, _) = self.site.at_middle(run, interval)?;
-            let range = self.site.of_run(run);
-            Some(anchor.at().saturating_sub(2).max(range.start)..(anchor.at() + 3).min(range.end))
+            Some(self.site.beside(anchor, NUM_ANCHORS_BESIDE))
         };
         let (Some(earlier), Some(later)) = (around(&stretch.earlier), around(&stretch.later)) else {
             return Vec::new();

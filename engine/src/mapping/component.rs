@@ -1,9 +1,9 @@
 //! Runs that hang together, with the closures that hold them: they settle, and they are laid over each other.
 
 use super::coarse_graph::{Closure, CoarseGraph};
-use super::guided::guided_round;
+use super::guided::{Looked, guided_round};
 use super::indices::{AnchorIdx, RunIdx};
-use super::join_evidence::JoinEvidence;
+use super::join_evidence::{JoinEvidence, contradiction, max_contradiction};
 use super::judgements::Judgements;
 use super::memo::RegistrationMemo;
 use super::place_match::{Channel, RejectionReason};
@@ -13,6 +13,12 @@ use super::watch::{MappingError, Span};
 use super::ways::Way;
 use crate::registration::Opinions;
 
+/// How often two components that are laid over each other are extended to where they run beside each other.
+const NUM_EXTENSIONS: usize = 2;
+/// A way is given up when the two contradict each other this many times as much as they may, before anything of it is
+/// registered: wrong ways stay about as contradicted as they begin.
+const HOPELESS: f64 = 2.0;
+
 /// Runs that share a frame.
 #[derive(Clone)]
 pub(crate) struct Component<'a> {
@@ -21,6 +27,8 @@ pub(crate) struct Component<'a> {
     pub closures: Vec<Closure>,
     /// Fits between its anchors that do not constrain it.
     pub refused: Vec<Refusal>,
+    /// What is known of its pairs of anchors.
+    looked: Looked,
 }
 
 /// What stays the same while a map is being built, and which part of that is at hand.
@@ -48,9 +56,13 @@ impl<'a> Component<'a> {
         let site = workshop.site;
         let mut graph = CoarseGraph::new(site, vec![run], |anchor| site.anchor(anchor).run_from_anchor)?;
         graph.optimize(&[])?;
-        let mut component = Self { graph, closures: Vec::new(), refused: Vec::new() };
+        let mut component = Self::new(graph, Looked::default());
         component.settle(workshop)?;
         Ok(component)
+    }
+
+    fn new(graph: CoarseGraph<'a>, looked: Looked) -> Self {
+        Self { graph, closures: Vec::new(), refused: Vec::new(), looked }
     }
 
     /// Guided matching and optimization in turns, until nothing new is found.
@@ -62,7 +74,8 @@ impl<'a> Component<'a> {
         let may_match = |a, b| site.may_match(a, b) && !judgements.forbid(a, b);
         let max_rounds = site.config.max_rounds;
         for round in 0..max_rounds {
-            let round = guided_round(&self.graph, &may_match, memo, span.part(round, max_rounds))?;
+            let round =
+                guided_round(&self.graph, &may_match, &mut self.looked, memo, span.part(round, max_rounds))?;
             let kept = self.graph.optimize(&round.closures)?;
             let (found, dropped) = sorted_out(round.closures, &kept);
             let refusal = |closure| Refusal {
@@ -82,47 +95,54 @@ impl<'a> Component<'a> {
 
     /// Share of the returns that its places contradict where it was driven again, in the direction in which it is less;
     /// 0 when it never came back to a place.
-    pub fn own_contradiction(&self) -> f64 {
-        let site = self.graph.site;
+    pub fn own_contradiction(&self, workshop: Workshop<'_>) -> f64 {
         let mut opinions = Opinions::default();
         for Closure { earlier, later, .. } in &self.closures {
             let relative = self.graph.pose(*earlier).between(&self.graph.pose(*later));
-            opinions += Opinions::of(site.submap(*earlier), site.submap(*later), &relative);
+            opinions += workshop.memo.opinions(workshop.site, (*earlier, *later), &relative);
         }
         if self.closures.is_empty() { 0.0 } else { opinions.one_sided_contradiction() }
     }
 
     /// Two components in one frame as a way says, extended to wherever they then run beside each other, with what
-    /// speaks for and against it; none when it falls apart at once.
+    /// speaks for and against it; none when it falls apart at once, or when the two contradict each other so much
+    /// that no registration will mend it. `own` is what the clearer of the two contradicts of itself.
     ///
     /// # Errors
     /// Whatever the graph cannot solve; [`MappingError::Stopped`].
     pub fn laid_over(
-        host: &Self,
-        guest: &Self,
+        (host, guest): (&Self, &Self),
         way: &Way,
+        own: f64,
         workshop: Workshop<'a>,
     ) -> Result<Option<(Self, JoinEvidence)>, MappingError> {
         let mut both = Self::side_by_side(host, guest, way)?;
         let inside = [host.closures.as_slice(), &guest.closures].concat();
         let mut across = way.closures.clone();
         let mut tried = Vec::new();
+        let mut looked = Looked::default();
         let is_across = |a, b| host.graph.holds(a) != host.graph.holds(b);
         let may_match = |a, b| is_across(a, b) && !workshop.judgements.forbid(a, b);
-        for is_last in [false, false, true] {
+        let hopeless = HOPELESS * max_contradiction(own, workshop.site.config);
+        for round in 0..=NUM_EXTENSIONS {
             let closures = [inside.as_slice(), &across].concat();
             let kept = both.graph.optimize(&closures)?;
             if !kept[inside.len()..].contains(&true) {
                 return Ok(None);
             }
-            if is_last {
+            if round == 0 && contradiction(&both.graph, (host, guest), workshop) > hopeless {
+                return Ok(None);
+            }
+            if round == NUM_EXTENSIONS {
                 both.closures = sorted_out(closures, &kept).0;
             } else {
-                let round = guided_round(&both.graph, &may_match, workshop.memo, workshop.span)?;
+                let Workshop { memo, span, .. } = workshop;
+                let round = guided_round(&both.graph, &may_match, &mut looked, memo, span)?;
                 (across, tried) = (round.closures, round.tried);
             }
         }
-        let evidence = JoinEvidence::of(&both, host, guest, &tried, workshop);
+        [&host.looked, &guest.looked, &looked].into_iter().for_each(|looked| both.looked.extend(looked));
+        let evidence = JoinEvidence::of(&both, (host, guest), own, &tried, workshop);
         Ok(Some((both, evidence)))
     }
 
@@ -133,7 +153,7 @@ impl<'a> Component<'a> {
             false => way.host_from_guest.compose(&guest.graph.pose(anchor)),
         };
         let graph = CoarseGraph::new(host.graph.site, runs, pose_of)?;
-        Ok(Self { graph, closures: Vec::new(), refused: Vec::new() })
+        Ok(Self::new(graph, Looked::default()))
     }
 }
 

@@ -57,8 +57,12 @@ pub struct MappingConfig {
     pub max_search_m: f64,
     /// Widest search around the predicted heading, radians.
     pub max_search_turn_rad: f64,
-    /// Of all passes beside a place the nearest so many are registered with it.
+    /// Of all passes of one run beside a place of it the nearest so many are registered with it …
     pub max_passes: usize,
+    /// … and of all passes of other runs so many.
+    pub max_other_passes: usize,
+    /// Passes of each direction beside a place with which a visit to it is matched, those first that were registered.
+    pub max_matched_passes: usize,
     /// Rounds of guided matching at most.
     pub max_rounds: usize,
     /// A registration is refused when its squared deviations from the prediction exceed this.
@@ -126,6 +130,8 @@ impl Default for MappingConfig {
             max_search_m: 5.0,
             max_search_turn_rad: 0.4,
             max_passes: 8,
+            max_other_passes: 3,
+            max_matched_passes: 2,
             max_rounds: 8,
             max_chi2: 16.0,
             min_support: 2,

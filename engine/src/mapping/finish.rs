@@ -31,6 +31,7 @@ pub(crate) fn finished(
         distance_m: site.config.beside_m,
         min_gap_m: site.config.min_gap_m,
         max_observations: MAX_STRETCH,
+        max_passes: site.config.max_matched_passes,
     };
     let component_of: Vec<u32> = runs.iter().map(|run| run.component).collect();
     let closures = ClosureIndex::new(site, &components);
@@ -38,7 +39,8 @@ pub(crate) fn finished(
         judgements.settle(&mut found);
         found
     };
-    let matches = find_stretches(told, &poses, &component_of, &settings)
+    let is_registered = |a, b| closures.is_registered(a, b);
+    let matches = find_stretches(told, &poses, &component_of, &is_registered, &settings)
         .iter()
         .map(|stretch| settled(closures.spatial_match(stretch, told)))
         .collect();

@@ -27,7 +27,7 @@ struct Neighbors {
 pub(crate) struct GuidedRound {
     /// Fits that agree with the graph and with each other.
     pub closures: Vec<Closure>,
-    /// All pairs of anchors that were registered.
+    /// All pairs of anchors that were looked at.
     pub tried: Vec<(AnchorIdx, AnchorIdx)>,
     /// Fits of submaps that agree, but not with the graph or with the fits around.
     pub refused: Vec<Closure>,
@@ -43,6 +43,53 @@ pub(crate) fn is_fit(fit: &SubmapFit, is_one_drive: bool, config: &MappingConfig
     agrees && fit.overlap >= config.min_overlap
 }
 
+/// What registrations have said of pairs of anchors, so that a map that hardly moved asks nothing again.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Looked {
+    pairs: BTreeMap<(AnchorIdx, AnchorIdx), (SearchWindow, Option<SubmapFit>)>,
+}
+
+/// A narrower window than before is another question when it is narrower by more than this, metres and radians: in a
+/// plain corridor the best place of a wide window need not be the best of a narrow one.
+const NARROWER_M: f64 = 0.25;
+const NARROWER_RAD: f64 = 0.05;
+
+impl Looked {
+    /// Takes over what others have looked at.
+    pub fn extend(&mut self, other: &Self) {
+        self.pairs.extend(other.pairs.iter().map(|(pair, said)| (*pair, *said)));
+    }
+
+    /// What a search of about the same window has said of a pair: a fit where the graph expects it, or that nothing
+    /// fits.
+    fn answer(&self, pair: &Neighbors, graph: &CoarseGraph<'_>) -> Option<Option<SubmapFit>> {
+        let Request { earlier, later, window } = &pair.request;
+        let (searched, fit) = self.pairs.get(&(*earlier, *later))?;
+        let is_same = searched.half_m <= window.half_m + NARROWER_M
+            && searched.half_turn_rad <= window.half_turn_rad + NARROWER_RAD;
+        match fit {
+            Some(fit) => (is_same && pair.expects(fit, graph)).then_some(Some(*fit)),
+            None => (is_same && holds(searched, window)).then_some(None),
+        }
+    }
+}
+
+/// True when every pose of `inner` lies in `outer`.
+fn holds(outer: &SearchWindow, inner: &SearchWindow) -> bool {
+    let (a, b) = (&outer.center, &inner.center);
+    let apart_m = (a.x - b.x).abs().max((a.y - b.y).abs());
+    let apart_rad = crate::geometry::wrap_angle(a.theta - b.theta).abs();
+    apart_m + inner.half_m <= outer.half_m && apart_rad + inner.half_turn_rad <= outer.half_turn_rad
+}
+
+impl Neighbors {
+    /// True when a fit lies where the graph expects it.
+    fn expects(&self, fit: &SubmapFit, graph: &CoarseGraph<'_>) -> bool {
+        let gate = self.covariance + graph.with_floor(&fit.covariance) + slack();
+        deviation2(&self.predicted, &fit.earlier_from_later, &gate) <= graph.site.config.max_chi2
+    }
+}
+
 /// Registers all neighbors of one graph that may be matched, and keeps the fits that agree with it and with each other.
 ///
 /// # Errors
@@ -50,23 +97,32 @@ pub(crate) fn is_fit(fit: &SubmapFit, is_one_drive: bool, config: &MappingConfig
 pub(crate) fn guided_round(
     graph: &CoarseGraph<'_>,
     may_match: &impl Fn(AnchorIdx, AnchorIdx) -> bool,
+    looked: &mut Looked,
     memo: &RegistrationMemo,
     span: Span<'_>,
 ) -> Result<GuidedRound, MappingError> {
     let (site, config) = (graph.site, graph.site.config);
     let neighbors = find_neighbors(graph, may_match, span.part(0, 2))?;
-    let requests: Vec<Request> = neighbors.iter().map(|pair| pair.request).collect();
-    let fits = memo.answers(&requests, site, span.part(1, 2))?;
+    let known: Vec<Option<Option<SubmapFit>>> =
+        neighbors.iter().map(|pair| looked.answer(pair, graph)).collect();
+    let unknown = neighbors.iter().zip(&known).filter(|(_, known)| known.is_none());
+    let requests: Vec<Request> = unknown.map(|(pair, _)| pair.request).collect();
+    let mut found = memo.answers(&requests, site, span.part(1, 2))?.into_iter();
     let mut closures = Vec::new();
     let mut uncertain = Vec::new();
     let mut refused = Vec::new();
-    for (pair, fit) in neighbors.iter().zip(fits) {
-        let Request { earlier, later, .. } = pair.request;
+    for (pair, known) in neighbors.iter().zip(known) {
+        let Request { earlier, later, window } = pair.request;
         let is_one_drive = site.run_of(earlier) == site.run_of(later);
-        let Some(fit) = fit.filter(|fit| is_fit(fit, is_one_drive, config)) else { continue };
+        let is_new = known.is_none();
+        let fit = known.unwrap_or_else(|| found.next().flatten());
+        let fit = fit.filter(|fit| is_fit(fit, is_one_drive, config));
+        if is_new {
+            looked.pairs.insert((earlier, later), (window, fit));
+        }
+        let Some(fit) = fit else { continue };
         let closure = Closure { earlier, later, fit };
-        let gate = pair.covariance + graph.with_floor(&fit.covariance) + slack();
-        if deviation2(&pair.predicted, &fit.earlier_from_later, &gate) > config.max_chi2 {
+        if !pair.expects(&fit, graph) {
             refused.push(closure);
             continue;
         }
@@ -79,7 +135,7 @@ pub(crate) fn guided_round(
     let (supported, alone): (Vec<_>, Vec<_>) = closures.iter().zip(&uncertain).partition(is_supported);
     refused.extend(alone.into_iter().map(|(closure, _)| *closure));
     let closures = supported.into_iter().map(|(closure, _)| *closure).collect();
-    let tried = requests.iter().map(|request| (request.earlier, request.later)).collect();
+    let tried = neighbors.iter().map(|pair| (pair.request.earlier, pair.request.later)).collect();
     Ok(GuidedRound { closures, tried, refused })
 }
 
@@ -89,9 +145,8 @@ fn find_neighbors(
     span: Span<'_>,
 ) -> Result<Vec<Neighbors>, MappingError> {
     let config = graph.site.config;
-    let mut solver = graph.covariances()?;
-    let mut found = Vec::new();
     let mut nearby = Nearby::new(config.neighbor_distance_m + config.max_search_m);
+    let mut near_of: Vec<(AnchorIdx, Vec<AnchorIdx>)> = Vec::new();
     for (idx, &later) in graph.anchors().iter().enumerate() {
         span.done(idx, graph.anchors().len())?;
         let here = graph.pose(later);
@@ -99,13 +154,24 @@ fn find_neighbors(
         let mut near = nearby.around(&here);
         near.retain(|&earlier| distance_m(earlier) < nearby.reach_m && may_match(earlier, later));
         nearby.insert(later, &here);
-        let near = nearest_of_each_pass(near, distance_m, config.max_passes);
-        let nodes: Vec<u32> = near.iter().map(|&earlier| graph.node(earlier) as u32).collect();
-        if nodes.is_empty() {
-            continue;
+        let (own, others): (Vec<_>, Vec<_>) =
+            near.into_iter().partition(|&earlier| graph.site.run_of(earlier) == graph.site.run_of(later));
+        let mut near = nearest_of_each_pass(own, distance_m, (config.max_passes, NUM_OF_OWN_PASS));
+        let of_others = (config.max_other_passes, NUM_OF_OTHER_PASS);
+        near.extend(nearest_of_each_pass(others, distance_m, of_others));
+        near.sort_unstable();
+        if !near.is_empty() {
+            near_of.push((later, near));
         }
-        let relatives = solver.relative_to_many(graph.node(later) as u32, &nodes)?;
-        for (&earlier, (later_from_earlier, covariance)) in near.iter().zip(relatives) {
+    }
+    let node = |anchor: AnchorIdx| graph.node(anchor) as u32;
+    let questions: Vec<(u32, Vec<u32>)> = (near_of.iter())
+        .map(|(later, near)| (node(*later), near.iter().map(|&earlier| node(earlier)).collect()))
+        .collect();
+    let relatives = graph.covariances()?.relatives(&questions)?;
+    let mut found = Vec::new();
+    for ((later, near), relatives) in near_of.into_iter().zip(relatives) {
+        for (earlier, (later_from_earlier, covariance)) in near.into_iter().zip(relatives) {
             let predicted = later_from_earlier.inverse();
             // The same uncertainty, seen from the earlier anchor; the lever of the heading matters little nearby.
             let covariance = crate::registration::rotated(&covariance, predicted.theta);
@@ -156,27 +222,30 @@ impl Nearby {
     }
 }
 
-/// Of every stretch of consecutive anchors the three that are nearest: more would say the same again. Of many stretches
+/// Anchors of a pass of the same run that are registered with one …
+const NUM_OF_OWN_PASS: usize = 3;
+/// … and of a pass of another run.
+const NUM_OF_OTHER_PASS: usize = 2;
+
+/// Of every stretch of consecutive anchors the few that are nearest: more would say the same again. Of many stretches
 /// the nearest few: a place that was passed a hundred times is known.
 fn nearest_of_each_pass(
     anchors: Vec<AnchorIdx>,
     distance_m: impl Fn(AnchorIdx) -> f64,
-    num_passes_max: usize,
+    (num_passes_max, num_of_pass_max): (usize, usize),
 ) -> Vec<AnchorIdx> {
     let mut passes: Vec<Vec<AnchorIdx>> = anchors
         .chunk_by(|a, b| a.at() + 1 == b.at())
         .map(|pass| {
             let mut by_distance = pass.to_vec();
             by_distance.sort_by(|&a, &b| distance_m(a).total_cmp(&distance_m(b)).then(a.cmp(&b)));
-            by_distance.truncate(3);
+            by_distance.truncate(num_of_pass_max);
             by_distance
         })
         .collect();
     passes.sort_by(|a, b| distance_m(a[0]).total_cmp(&distance_m(b[0])).then(a[0].cmp(&b[0])));
     passes.truncate(num_passes_max);
-    let mut chosen: Vec<AnchorIdx> = passes.into_iter().flatten().collect();
-    chosen.sort_unstable();
-    chosen
+    passes.into_iter().flatten().collect()
 }
 
 /// How many other closures nearby along both runs say the same.

@@ -4,10 +4,11 @@ use std::collections::BTreeSet;
 
 use nalgebra::Matrix2;
 
+use super::coarse_graph::CoarseGraph;
 use super::component::{Component, Workshop};
 use super::config::MappingConfig;
 use super::indices::AnchorIdx;
-use super::overlap::overlap;
+use super::overlap::{LocalOpinions, overlap};
 use crate::registration::Opinions;
 
 /// Anchors this close lie beside each other, metres.
@@ -37,8 +38,8 @@ impl JoinEvidence {
     /// Judges two components laid over each other by their closures and all pairs that were tried.
     pub fn of(
         both: &Component<'_>,
-        host: &Component<'_>,
-        guest: &Component<'_>,
+        (host, guest): (&Component<'_>, &Component<'_>),
+        own_contradiction: f64,
         tried: &[(AnchorIdx, AnchorIdx)],
         workshop: Workshop<'_>,
     ) -> Self {
@@ -62,19 +63,14 @@ impl JoinEvidence {
             information += place.try_inverse().unwrap_or_else(Matrix2::zeros);
         }
         let weakest = information.symmetric_eigenvalues().min();
-        let mut opinions = Opinions::default();
-        let locals =
-            overlap(graph.site, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()));
-        for local in &locals {
-            opinions += local.opinions;
-        }
+        let locals = laid(graph, (host, guest), workshop);
         let near_m = graph.site.config.neighbor_distance_m;
         Self {
             num_anchors: anchors.len(),
             share: tried.intersection(&anchors).count() as f64 / tried.len().max(1) as f64,
             worst_sd_m: if weakest > 0.0 { 1.0 / weakest.sqrt() } else { f64::INFINITY },
-            one_sided_contradiction: opinions.one_sided_contradiction(),
-            own_contradiction: host.own_contradiction().min(guest.own_contradiction()),
+            one_sided_contradiction: one_sided(&locals),
+            own_contradiction,
             num_beside: locals.iter().filter(|local| local.nearest_m < BESIDE_M).count(),
             is_vetoed: workshop.judgements.contradict(graph, near_m, |anchor| guest.graph.holds(anchor)),
         }
@@ -83,11 +79,38 @@ impl JoinEvidence {
     /// True when the joined map may stand. Where host and guest both contradict themselves, because people crowd there or
     /// what they saw is full of small things, the two may contradict each other a little more than that.
     pub fn holds(&self, config: &MappingConfig) -> bool {
-        let max_contradiction =
-            config.max_contradiction.max(config.max_contradiction_over_own * self.own_contradiction);
         self.num_anchors >= config.min_joining_anchors
             && self.share >= config.min_joining_share
             && self.worst_sd_m <= config.max_joining_sd_m
-            && self.one_sided_contradiction <= max_contradiction
+            && self.one_sided_contradiction <= max_contradiction(self.own_contradiction, config)
     }
+}
+
+/// What two components may contradict of each other, given what the clearer of them contradicts of itself.
+pub(crate) fn max_contradiction(own: f64, config: &MappingConfig) -> f64 {
+    config.max_contradiction.max(config.max_contradiction_over_own * own)
+}
+
+/// The share of the returns that host and guest contradict of each other where a graph puts them, whichever way is
+/// less.
+pub(crate) fn contradiction(
+    graph: &CoarseGraph<'_>,
+    pair: (&Component<'_>, &Component<'_>),
+    workshop: Workshop<'_>,
+) -> f64 {
+    one_sided(&laid(graph, pair, workshop))
+}
+
+fn laid(
+    graph: &CoarseGraph<'_>,
+    (host, guest): (&Component<'_>, &Component<'_>),
+    workshop: Workshop<'_>,
+) -> Vec<LocalOpinions> {
+    overlap(workshop, &graph.placed(guest.graph.anchors()), &graph.placed(host.graph.anchors()))
+}
+
+fn one_sided(locals: &[LocalOpinions]) -> f64 {
+    let mut opinions = Opinions::default();
+    locals.iter().for_each(|local| opinions += local.opinions);
+    opinions.one_sided_contradiction()
 }

@@ -50,10 +50,13 @@ pub(crate) fn join<'a>(
     alone: Vec<Component<'a>>,
     workshop: Workshop<'a>,
 ) -> Result<Joined<'a>, MappingError> {
-    let candidates: Vec<Candidate> = candidates_across(workshop.site)
-        .into_iter()
-        .filter(|candidate| !workshop.judgements.forbid(candidate.earlier, candidate.later))
-        .collect();
+    let run_of = |anchor| workshop.site.anchor(anchor).run;
+    let may_be = |candidate: &Candidate| {
+        let (earlier, later) = (candidate.earlier, candidate.later);
+        let judgements = workshop.judgements;
+        !judgements.forbid(earlier, later) && !judgements.keep_apart(&[run_of(earlier)], &[run_of(later)])
+    };
+    let candidates: Vec<Candidate> = candidates_across(workshop.site).into_iter().filter(may_be).collect();
     let null = Null::of(&alone, workshop.part(0, 3))?;
     let mut joiner = Joiner::new(alone, &candidates, null, workshop);
     let mut proposals = joiner.proposals(|_, _| true);
@@ -119,6 +122,10 @@ impl<'a, 'c> Joiner<'a, 'c> {
                 firsts.iter().filter(move |&&guest| host < guest).map(move |&guest| (host, guest))
             })
             .filter(|&(host, guest)| is_wanted(host, guest))
+            .filter(|(host, guest)| {
+                let runs = |first: &RunIdx| self.components[first].graph.runs();
+                !self.workshop.judgements.keep_apart(runs(host), runs(guest))
+            })
             .collect();
         let proposal = |&(host, guest): &(RunIdx, RunIdx)| {
             let groups = Groups::new(&self.components[&host], &self.components[&guest], self.candidates);
@@ -207,9 +214,11 @@ fn judged<'a>(
     workshop: Workshop<'a>,
 ) -> Result<Verdict<'a>, MappingError> {
     let config = workshop.site.config;
+    let own = host.own_contradiction(workshop).min(guest.own_contradiction(workshop));
     let mut laid: Vec<(JoinEvidence, Component<'a>)> = Vec::new();
     for (idx, way) in different(ways, guest).into_iter().take(config.max_hypotheses).enumerate() {
-        let found = Component::laid_over(host, guest, way, workshop.part(idx, config.max_hypotheses))?;
+        let workshop = workshop.part(idx, config.max_hypotheses);
+        let found = Component::laid_over((host, guest), way, own, workshop)?;
         laid.extend(found.map(|(both, evidence)| (evidence, both)));
     }
     let (mut holding, others): (Vec<_>, Vec<_>) =

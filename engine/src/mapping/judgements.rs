@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use super::coarse_graph::CoarseGraph;
-use super::indices::AnchorIdx;
+use super::indices::{AnchorIdx, RunIdx};
 use super::place_match::{Decision, MatchState, PlaceMatch, RejectionReason};
 use super::site_anchors::SiteAnchors;
 use crate::text::Interval;
@@ -15,6 +15,8 @@ use crate::text::Interval;
 pub(crate) struct Judgements<'a> {
     decisions: &'a [Decision],
     vetoes: Vec<Veto>,
+    /// For each run where it belongs, when somebody said.
+    areas: Vec<Option<&'a str>>,
 }
 
 /// Anchors that no closure may bring together.
@@ -25,7 +27,7 @@ struct Veto {
 
 impl<'a> Judgements<'a> {
     /// Finds the anchors whose submaps reach into the stretches of each veto.
-    pub fn new(decisions: &'a [Decision], site: &SiteAnchors<'_>) -> Self {
+    pub fn new(decisions: &'a [Decision], site: &SiteAnchors<'a>) -> Self {
         let vetoes = decisions
             .iter()
             .filter(|decision| !decision.is_same_place)
@@ -36,7 +38,8 @@ impl<'a> Judgements<'a> {
                 })
             })
             .collect();
-        Self { decisions, vetoes }
+        let areas = site.runs().map(|run| site.record(run).area).collect();
+        Self { decisions, vetoes, areas }
     }
 
     /// True when a person said that these two anchors are different places.
@@ -46,6 +49,14 @@ impl<'a> Judgements<'a> {
             (veto.earlier.contains(&a) && veto.later.contains(&b))
                 || (veto.earlier.contains(&b) && veto.later.contains(&a))
         })
+    }
+
+    /// True when some of these runs were said to belong to another area than some of those.
+    pub fn keep_apart(&self, these: &[RunIdx], those: &[RunIdx]) -> bool {
+        let areas =
+            |runs: &[RunIdx]| -> Vec<&str> { runs.iter().filter_map(|run| self.areas[run.at()]).collect() };
+        let those = areas(those);
+        areas(these).iter().any(|area| those.iter().any(|other| other != area))
     }
 
     /// True when a graph lays two places over each other, one for which `is_guest` and one for which it is not, that a

@@ -11,7 +11,7 @@ use super::indices::AnchorIdx;
 use super::site_anchors::SiteAnchors;
 use super::watch::{MappingError, Span};
 use crate::geometry::Pose2;
-use crate::registration::{SearchWindow, SubmapConfig, SubmapFit, register};
+use crate::registration::{Opinions, SearchWindow, SubmapConfig, SubmapFit, register};
 
 /// A registration that is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,10 +26,19 @@ pub(crate) struct Request {
 
 type Key = (u64, u64, [i32; 5]);
 
+/// Two submaps and the bits of how the one lies in the other.
+type LaidKey = (u64, u64, [u64; 3]);
+
+/// More opinions than these are not kept from one build to the next.
+const NUM_OPINIONS_MAX: usize = 500_000;
+
 /// Answers of registrations by the content of what was registered: whatever it holds, results are the same.
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
     fits: Mutex<HashMap<Key, Option<SubmapFit>>>,
+    /// What submaps said of each other; cheaper than the submaps, which need not be made again.
+    #[serde(skip)]
+    opinions: Mutex<HashMap<LaidKey, Opinions>>,
     config: Option<SubmapConfig>,
 }
 
@@ -46,10 +55,34 @@ impl RegistrationMemo {
 
     /// Forgets everything when the settings are others than before.
     pub(crate) fn prepare(&mut self, config: &SubmapConfig) {
-        if self.config.as_ref() != Some(config) {
+        let is_other = self.config.as_ref() != Some(config);
+        let opinions = self.opinions.get_mut().unwrap_or_else(PoisonError::into_inner);
+        if is_other || opinions.len() > NUM_OPINIONS_MAX {
+            opinions.clear();
+        }
+        if is_other {
             self.fits.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
             self.config = Some(config.clone());
         }
+    }
+
+    /// What two submaps that lie like this say of each other.
+    pub(crate) fn opinions(
+        &self,
+        site: &SiteAnchors<'_>,
+        (earlier, later): (AnchorIdx, AnchorIdx),
+        earlier_from_later: &Pose2,
+    ) -> Opinions {
+        let Pose2 { x, y, theta } = earlier_from_later;
+        let name = |anchor| site.anchor(anchor).fingerprint;
+        let key = (name(earlier), name(later), [x, y, theta].map(|value| value.to_bits()));
+        let known = |opinions: &HashMap<LaidKey, Opinions>| opinions.get(&key).copied();
+        if let Some(known) = known(&self.opinions.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return known;
+        }
+        let opinions = Opinions::of(site.submap(earlier), site.submap(later), earlier_from_later);
+        self.opinions.lock().unwrap_or_else(PoisonError::into_inner).insert(key, opinions);
+        opinions
     }
 
     /// Answers in the order of the requests; what is not remembered is computed in parallel.

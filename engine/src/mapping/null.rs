@@ -67,16 +67,15 @@ fn wrong_ways(component: &Component<'_>, workshop: Workshop<'_>) -> Result<Vec<W
     let apart_m = site.config.neighbor_distance_m;
     candidates.retain(|found| graph.pose(found.earlier).distance(&graph.pose(found.later)) > apart_m);
     let registered = Groups::new(component, component, &candidates).ways(workshop)?;
-    Ok(registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way)).collect())
+    Ok(registered.ways.iter().take(NUM_WAYS).map(|way| wrong_way(component, way, workshop)).collect())
 }
 
 /// The component laid over itself, moved as a whole.
-fn wrong_way(component: &Component<'_>, way: &Way) -> WrongWay {
-    let site = component.graph.site;
+fn wrong_way(component: &Component<'_>, way: &Way, workshop: Workshop<'_>) -> WrongWay {
     let hosts = component.graph.placed(component.graph.anchors());
     let moved = |(anchor, pose): &(AnchorIdx, Pose2)| (*anchor, way.host_from_guest.compose(pose));
     let guests: Vec<_> = hosts.iter().map(moved).collect();
-    let locals = overlap(site, &guests, &hosts);
+    let locals = overlap(workshop, &guests, &hosts);
     let mut opinions = Opinions::default();
     locals.iter().for_each(|local| opinions += local.opinions);
     WrongWay {

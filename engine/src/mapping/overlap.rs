@@ -5,8 +5,8 @@
 //! saw is compared as it lies, nothing is moved. How much contradiction a true overlap brings depends on the place:
 //! people, doors and glass make a run contradict itself, and that is what a join is measured by.
 
+use super::component::Workshop;
 use super::indices::AnchorIdx;
-use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::registration::Opinions;
 
@@ -25,7 +25,7 @@ pub(crate) struct LocalOpinions {
 
 /// Compares every guest anchor that lies on the host with the host anchors nearest to it, each where it is said to be.
 pub(crate) fn overlap(
-    site: &SiteAnchors<'_>,
+    workshop: Workshop<'_>,
     guests: &[(AnchorIdx, Pose2)],
     hosts: &[(AnchorIdx, Pose2)],
 ) -> Vec<LocalOpinions> {
@@ -40,7 +40,7 @@ pub(crate) fn overlap(
         let mut opinions = Opinions::default();
         for (_, host, host_pose) in near.iter().take(MAX_HOSTS) {
             let host_from_guest = host_pose.between(guest_pose);
-            opinions += Opinions::of(site.submap(*host), site.submap(*guest), &host_from_guest);
+            opinions += workshop.memo.opinions(workshop.site, (*host, *guest), &host_from_guest);
         }
         if let Some((nearest_m, ..)) = near.first() {
             found.push(LocalOpinions { nearest_m: *nearest_m, opinions });

@@ -34,4 +34,6 @@ pub struct RunRecord<'a> {
     pub words: &'a [Word],
     /// Registered scans in order of travel.
     pub keyframes: &'a [Keyframe],
+    /// Where the run belongs, for instance a floor, when somebody said; runs of different areas are never joined.
+    pub area: Option<&'a str>,
 }

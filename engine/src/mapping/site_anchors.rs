@@ -115,6 +115,12 @@ impl<'a> SiteAnchors<'a> {
         self.starts[run.at()]..self.starts[run.at() + 1]
     }
 
+    /// Anchors of the same run up to so many before and behind one.
+    pub fn beside(&self, anchor: AnchorIdx, num: usize) -> Range<usize> {
+        let range = self.of_run(self.run_of(anchor));
+        anchor.at().saturating_sub(num).max(range.start)..(anchor.at() + num + 1).min(range.end)
+    }
+
     /// An anchor.
     pub fn anchor(&self, anchor: AnchorIdx) -> &Anchor {
         &self.anchors[anchor.at()]

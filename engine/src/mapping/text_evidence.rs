@@ -367,8 +367,10 @@ mod tests {
             observations: &observations,
             words: &words,
             keyframes: &keyframes,
+            area: None,
         };
-        let other = RunRecord { geometry: &geometry, observations: &[], words: &usual, keyframes: &[] };
+        let other =
+            RunRecord { geometry: &geometry, observations: &[], words: &usual, keyframes: &[], area: None };
         // The map may have put the second lap elsewhere.
         let shifted = |(index, keyframe): (usize, &Keyframe)| {
             let shift_m = if index >= observations.len() / 2 { shift_m } else { 0.0 };

@@ -73,6 +73,20 @@ pub fn aligned_nodes(
     pairs
 }
 
+/// What a match of two stretches claims: as many pairs as the longer one has observations.
+pub(crate) fn claimed_between(
+    earlier: (u32, u32),
+    later: (u32, u32),
+    direction: Direction,
+) -> impl Iterator<Item = ObservationPair> {
+    let is_earlier_longer = earlier.1 - earlier.0 > later.1 - later.0;
+    let (shorter, longer) = if is_earlier_longer { (later, earlier) } else { (earlier, later) };
+    proportional_pairs(shorter, longer, direction).map(move |pair| match is_earlier_longer {
+        true => ObservationPair { earlier: pair.later, later: pair.earlier },
+        false => pair,
+    })
+}
+
 /// Pairs each observation of `later` with the one at the same share of `earlier`, rounded to the nearest.
 fn proportional_pairs(
     earlier: (u32, u32),

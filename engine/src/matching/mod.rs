@@ -14,6 +14,7 @@ mod chain_tests;
 
 pub use alignment::{Alignment, align_words};
 pub use chain::{Chain, ChainFinder, Relation, find_chains, find_chains_in};
+pub(crate) use claim::claimed_between;
 pub use claim::{ObservationPair, aligned_nodes, chain_stretches, claimed_pairs};
 pub use config::MatchingConfig;
 pub use evidence::{ChainEvidence, TextStatistics};

@@ -128,11 +128,10 @@ fn agreements(
         let others = &group[..k];
         let starts: Vec<u32> = others.iter().map(|(_, other)| other.i).collect();
         let ends: Vec<u32> = others.iter().map(|(_, other)| other.j).collect();
-        let along_first = solver.relative_to_many(bridge.i, &starts)?;
-        let along_second = solver.relative_to_many(bridge.j, &ends)?;
+        let relatives = solver.relatives(&[(bridge.i, starts), (bridge.j, ends)])?;
         for (l, (_, other)) in others.iter().enumerate() {
             let [first, second] =
-                [along_first[l], along_second[l]].map(|(pose, covariance)| Uncertain { pose, covariance });
+                [relatives[0][l], relatives[1][l]].map(|(pose, covariance)| Uncertain { pose, covariance });
             let around = bridge.measured.compose(&second).compose(&other.measured.inverse());
             let closes = around.chi2_against(&first).is_some_and(|chi2| chi2 <= config.cycle_chi2_max);
             agrees[k][l] = closes;

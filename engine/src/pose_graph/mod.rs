@@ -28,6 +28,7 @@ mod optimizer;
 mod paths;
 mod residual;
 mod robust;
+mod selected_inverse;
 mod spanning_tree;
 mod sparse_cholesky;
 mod support;

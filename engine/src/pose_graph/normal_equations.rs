@@ -7,6 +7,7 @@
 use faer::sparse::SymbolicSparseColMat;
 use nalgebra::{SMatrix, SVector};
 
+use super::selected_inverse::Workspace;
 use super::sparse_cholesky::{ColumnPattern, FactorError, SparseCholesky, Triangle, fill_reducing_order};
 use super::{PoseConstraint, PoseGraphError};
 
@@ -211,28 +212,27 @@ impl<const D: usize> NormalEquations<D> {
         SVector::from_column_slice(&self.right_hand_side[first..first + D])
     }
 
-    /// Columns of H⁻¹ that belong to one pose, as rows of blocks by pose: `column(k)` of the result of `block(q)`
-    /// is the covariance between pose q and coordinate k.
-    pub fn inverse_columns(&mut self, pose: usize) -> InverseColumns<D> {
-        let num_unknowns = self.right_hand_side.len();
-        let mut columns = vec![0.0; D * num_unknowns];
-        let first = D * self.position_of[pose] as usize;
-        for k in 0..D {
-            columns[k * num_unknowns + first + k] = 1.0;
-        }
-        self.cholesky.solve_in_place(&mut columns);
-        InverseColumns { columns, num_unknowns }
+    /// Covariance blocks between each of `others` (rows) and a pose (columns); empty unless laid out by columns.
+    pub fn inverse_blocks(
+        &self,
+        pose: usize,
+        others: &[u32],
+        workspace: &mut Workspace<D>,
+    ) -> Vec<SMatrix<f64, D, D>> {
+        let first = |pose: usize| D * self.position_of[pose] as usize;
+        let Some(factor) = self.cholesky.columns() else { return Vec::new() };
+        let wanted: Vec<usize> = others.iter().map(|&other| first(other as usize)).collect();
+        factor.inverse_blocks(first(pose), &wanted, workspace)
     }
 
-    /// Covariance block between a pose and the pose whose columns were solved for.
-    pub fn inverse_block(&self, columns: &InverseColumns<D>, pose: usize) -> SMatrix<f64, D, D> {
-        let first = D * self.position_of[pose] as usize;
-        SMatrix::from_fn(|row, k| columns.columns[k * columns.num_unknowns + first + row])
+    /// Memory for [`NormalEquations::inverse_blocks`].
+    pub fn workspace(&self) -> Workspace<D> {
+        Workspace::new(self.right_hand_side.len())
     }
 
     /// Diagonal blocks of H⁻¹ for all poses; `None` unless laid out by columns.
     pub fn inverse_diagonal(&self) -> Option<Vec<SMatrix<f64, D, D>>> {
-        let inverse = self.cholesky.inverse_on_pattern()?;
+        let inverse = self.cholesky.columns()?.inverse_on_pattern();
         let block = |&position: &u32| {
             let first = D * position as usize;
             let entry =
@@ -282,12 +282,6 @@ impl<const D: usize> NormalEquations<D> {
             *value += addend;
         }
     }
-}
-
-/// Some columns of H⁻¹.
-pub(super) struct InverseColumns<const D: usize> {
-    columns: Vec<f64>,
-    num_unknowns: usize,
 }
 
 /// Expands blocks to unknowns: every block column becomes D columns, the diagonal block a triangle.

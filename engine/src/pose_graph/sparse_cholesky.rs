@@ -14,6 +14,8 @@ use faer::sparse::linalg::{SupernodalThreshold, amd};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMat, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::selected_inverse::ColumnFactor;
+
 /// Which half of the symmetric matrix is stored, compressed by columns with sorted rows, diagonal included.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Triangle {
@@ -73,7 +75,7 @@ impl SparseCholesky {
     /// Analyses a pattern given as its upper triangle, already in elimination order.
     ///
     /// Dense blocks of columns are used where they pay, unless `by_columns` asks for plain columns, which
-    /// [`SparseCholesky::inverse_on_pattern`] needs.
+    /// [`SparseCholesky::columns`] needs.
     pub fn analyze(upper: &SymbolicSparseColMat<u32>, by_columns: bool) -> Result<Self, FactorError> {
         let threshold =
             if by_columns { SupernodalThreshold::FORCE_SIMPLICIAL } else { SupernodalThreshold::AUTO };
@@ -86,7 +88,7 @@ impl SparseCholesky {
         .map_err(|_| FactorError::OutOfMemory)?;
         let request = StackReq::or(
             symbolic.factorize_numeric_llt_scratch::<f64>(Par::Seq, Default::default()),
-            symbolic.solve_in_place_scratch::<f64>(MAX_RIGHT_HAND_SIDES, Par::Seq),
+            symbolic.solve_in_place_scratch::<f64>(1, Par::Seq),
         );
         let memory = MemBuffer::try_new(request).map_err(|_| FactorError::OutOfMemory)?;
         let factor = vec![0.0; symbolic.len_val()];
@@ -128,78 +130,22 @@ impl SparseCholesky {
             })
     }
 
-    /// Solves for at most [`MAX_RIGHT_HAND_SIDES`] columns, stored one after the other, in place.
-    pub fn solve_in_place(&mut self, columns: &mut [f64]) {
+    /// Solves in place.
+    pub fn solve_in_place(&mut self, right_hand_side: &mut [f64]) {
         let num_unknowns = self.symbolic.nrows();
-        let num_columns = columns.len() / num_unknowns.max(1);
-        debug_assert!(num_columns <= MAX_RIGHT_HAND_SIDES && num_columns * num_unknowns == columns.len());
-        let right_hand_sides = MatMut::from_column_major_slice_mut(columns, num_unknowns, num_columns);
+        debug_assert_eq!(num_unknowns, right_hand_side.len());
+        let right_hand_side = MatMut::from_column_major_slice_mut(right_hand_side, num_unknowns, 1);
         LltRef::new(&self.symbolic, &self.factor).solve_in_place_with_conj(
             Conj::No,
-            right_hand_sides,
+            right_hand_side,
             Par::Seq,
             MemStack::new(&mut self.memory),
         );
     }
 
-    /// The entries of the inverse where the factor has entries (Takahashi's recursion); `None` unless the analysis
-    /// was asked for plain columns. Costs about as much as the factorisation, whatever the number of unknowns.
-    pub fn inverse_on_pattern(&self) -> Option<SelectedInverse<'_>> {
+    /// The factor in plain columns; `None` unless the analysis was asked for them.
+    pub fn columns(&self) -> Option<ColumnFactor<'_>> {
         let SymbolicCholeskyRaw::Simplicial(columns) = self.symbolic.raw() else { return None };
-        let (starts, rows) = (columns.col_ptr(), columns.row_idx());
-        let num_unknowns = columns.ncols();
-        let mut inverse = vec![0.0; self.factor.len()];
-        // Place of a row within the column at hand; 0 where it has no entry.
-        let mut place = vec![0usize; num_unknowns];
-        let mut sums: Vec<f64> = Vec::new();
-        for column in (0..num_unknowns).rev() {
-            let (start, end) = (starts[column] as usize, starts[column + 1] as usize);
-            let (below, factor) = (&rows[start + 1..end], &self.factor[start + 1..end]);
-            sums.clear();
-            sums.resize(below.len() + 1, 0.0);
-            for (index, &row) in below.iter().enumerate() {
-                place[row as usize] = index + 1;
-            }
-            for (index, &k) in below.iter().enumerate() {
-                let first = starts[k as usize] as usize;
-                sums[index + 1] += factor[index] * inverse[first];
-                for entry in first + 1..starts[k as usize + 1] as usize {
-                    let other = place[rows[entry] as usize];
-                    if other > 0 {
-                        sums[other] += factor[index] * inverse[entry];
-                        sums[index + 1] += factor[other - 1] * inverse[entry];
-                    }
-                }
-            }
-            let pivot = self.factor[start].recip();
-            let mut diagonal = pivot * pivot;
-            for (index, &row) in below.iter().enumerate() {
-                let entry = -pivot * sums[index + 1];
-                inverse[start + 1 + index] = entry;
-                diagonal -= pivot * factor[index] * entry;
-                place[row as usize] = 0;
-            }
-            inverse[start] = diagonal;
-        }
-        Some(SelectedInverse { starts, rows, inverse })
+        Some(ColumnFactor { starts: columns.col_ptr(), rows: columns.row_idx(), values: &self.factor })
     }
 }
-
-/// Entries of an inverse where the factor has entries.
-pub(super) struct SelectedInverse<'a> {
-    starts: &'a [u32],
-    rows: &'a [u32],
-    inverse: Vec<f64>,
-}
-
-impl SelectedInverse<'_> {
-    /// An entry on or below the diagonal; `None` outside the pattern of the factor.
-    pub fn get(&self, row: usize, column: usize) -> Option<f64> {
-        let range = self.starts[column] as usize..self.starts[column + 1] as usize;
-        let offset = self.rows[range.clone()].binary_search(&(row as u32)).ok()?;
-        Some(self.inverse[range.start + offset])
-    }
-}
-
-/// Most columns that are solved for at once.
-pub(super) const MAX_RIGHT_HAND_SIDES: usize = 6;

@@ -324,8 +324,8 @@ fn over_all(
         }
         let others: Vec<u32> = may_fit.iter().map(|(_, other, _)| *other).collect();
         if !others.is_empty() {
-            let believed = solver.relative_to_many(pose, &others)?;
-            beliefs.extend(may_fit.into_iter().zip(believed).map(
+            let believed = solver.relatives(&[(pose, others)])?;
+            beliefs.extend(may_fit.into_iter().zip(believed.into_iter().flatten()).map(
                 |((index, _, measured), (pose, covariance))| Belief {
                     index,
                     measured,

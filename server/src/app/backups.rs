@@ -33,8 +33,9 @@ impl App {
         name: &Name,
         backup: impl Stream<Item = Result<Bytes, E>> + Send,
     ) -> Result<Arc<Site>, AppError> {
+        self.check_here(name)?;
         let _queue = self.making_sites.lock().await;
-        if self.storage.list().await?.iter().any(|known| known == name.as_str()) {
+        if self.storage.contains(name.as_str()).await? {
             return Err(AppError::Exists { detail: format!("the site `{name}` stands") });
         }
         if let Err(error) = self.fill(name, backup).await {

@@ -54,6 +54,9 @@ pub enum AppError {
         /// What is missing and how to get it.
         detail: String,
     },
+    /// The site is served by another server, or on its way from one to another.
+    #[error("the site is moving between servers")]
+    Elsewhere,
     /// A bounded queue is full.
     #[error("{queue} is full")]
     Busy {

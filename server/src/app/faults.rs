@@ -62,7 +62,7 @@ async fn insist<T>(what: &str, mut ask: impl AsyncFnMut() -> Result<T, AppError>
 /// A run of so many scans, finished.
 pub(super) async fn drive(app: &Arc<App>, site: &Arc<Site>, run: &Name, num_scans: usize) {
     let geometry = geometry();
-    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
+    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry, area: None };
     app.make_run(site, run, new).await.unwrap();
     let batch = NewBatch { first_sequence: 0, scans: scans()[..num_scans].to_vec(), has_odometry: true };
     app.append_batch(Arc::clone(site), run, batch).await.unwrap();
@@ -77,7 +77,7 @@ async fn work(storage: Arc<dyn Storage>) -> String {
     let app = Arc::new(App::new(config, storage));
     let (site_name, run_name) = (Name::new("s", "site").unwrap(), Name::new("r", "run").unwrap());
     let geometry = geometry();
-    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
+    let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry, area: None };
     insist("site", async || app.make_site(&site_name, None).await.map(|_| ())).await;
     let site = insist("open", async || app.site(&site_name).await).await;
     insist("run", async || app.make_run(&site, &run_name, new.clone()).await.map(|_| ())).await;

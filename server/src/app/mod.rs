@@ -15,7 +15,7 @@
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
 
 use locution_engine::locate::ServedMap;
@@ -61,13 +61,18 @@ const NUM_GRIDS_KEPT: NonZeroUsize = NonZeroUsize::new(4).expect("four is not ze
 /// Jobs are waited for so long when the server ends.
 const JOBS_END_MAX: Duration = Duration::from_secs(3);
 
+/// Says whether this server serves a site.
+type Serves = Box<dyn Fn(&str) -> bool + Send + Sync>;
+
 /// The application: every use case begins here.
 pub struct App {
     config: ServerConfig,
     storage: Arc<dyn Storage>,
     sites: Mutex<HashMap<Name, Arc<Site>>>,
+    /// Says which sites this server serves; all, when nobody else does.
+    serves: OnceLock<Serves>,
     making_sites: tokio::sync::Mutex<()>,
-    opening_sites: tokio::sync::Mutex<()>,
+    opening_sites: Mutex<HashMap<Name, Arc<tokio::sync::Mutex<()>>>>,
     turns: Turns,
     /// Everything that works on jobs.
     working: TaskTracker,
@@ -102,14 +107,21 @@ impl App {
             config,
             storage,
             sites: Mutex::default(),
+            serves: OnceLock::new(),
             making_sites: tokio::sync::Mutex::default(),
-            opening_sites: tokio::sync::Mutex::default(),
+            opening_sites: Mutex::default(),
         }
     }
 
     /// The configuration it runs with.
     pub fn config(&self) -> &ServerConfig {
         &self.config
+    }
+
+    /// Leaves the sites to other servers for which `serves` is not true; it is asked at every use of a site. To be called
+    /// once, before anything else.
+    pub fn share(&self, serves: impl Fn(&str) -> bool + Send + Sync + 'static) {
+        let _ = self.serves.set(Box::new(serves));
     }
 
     /// A place among those who watch events.
@@ -123,7 +135,7 @@ impl App {
             .map_err(|_| AppError::Busy { queue, retry_after: Duration::from_secs(10) })
     }
 
-    /// Opens every site, so that what was interrupted goes on; a site that cannot be opened does not stop the others.
+    /// Opens every site that this server serves, so that what was interrupted goes on; a site that cannot be opened does not stop the others.
     ///
     /// # Errors
     /// Those of the storage as a whole.

@@ -181,7 +181,7 @@ impl Stage {
 
     async fn make_run(&self, run: &str) -> Result<String, AppError> {
         let geometry = geometry();
-        let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry };
+        let new = NewRun { robot: None, readings: ReadingRules::of(&geometry), geometry, area: None };
         let (run, is_new) = self.app.make_run(&*self.site().await?, &name(run), new).await?;
         Ok(format!("{}, run {}\n", if is_new { "made" } else { "was there" }, run.idx))
     }

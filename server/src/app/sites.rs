@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, PoisonError};
 
+use futures::future::join_all;
+use futures::{StreamExt, stream};
 use locution_engine::config::EngineConfig;
 use rand::TryRng;
 use rand::rngs::SysRng;
@@ -10,6 +12,9 @@ use super::site::{JobInfo, Site};
 use super::{App, AppError, Name};
 use crate::records::{JobKind, Key, Retention, SiteRecord};
 use crate::storage::{Batch, Precondition};
+
+/// Sites that are opened at once when all are asked for.
+const NUM_OPENED_AT_ONCE: usize = 8;
 
 /// A site in a list.
 pub struct ListedSite {
@@ -22,6 +27,31 @@ pub struct ListedSite {
 /// Nothing but chance tells a site from another of the same name.
 pub(super) fn new_birth() -> Result<u64, AppError> {
     SysRng.try_next_u64().map_err(AppError::internal)
+}
+
+/// Those who wait for a site to be opened, so that it is opened once; sites do not wait for each other.
+struct OpeningQueue<'a> {
+    app: &'a App,
+    name: &'a Name,
+    turns: Arc<tokio::sync::Mutex<()>>,
+}
+
+impl<'a> OpeningQueue<'a> {
+    fn of(app: &'a App, name: &'a Name) -> Self {
+        let mut queues = app.opening_sites.lock().unwrap_or_else(PoisonError::into_inner);
+        let turns = Arc::clone(queues.entry(name.clone()).or_default());
+        Self { app, name, turns }
+    }
+}
+
+impl Drop for OpeningQueue<'_> {
+    fn drop(&mut self) {
+        let mut queues = self.app.opening_sites.lock().unwrap_or_else(PoisonError::into_inner);
+        // The table and this guard hold it, and nobody can join while the table is locked.
+        if Arc::strong_count(&self.turns) == 2 {
+            queues.remove(self.name);
+        }
+    }
 }
 
 /// Indexes the texts of a site in the background, so that the first question need not wait for it.
@@ -48,6 +78,7 @@ impl App {
         if let Some(config) = &config {
             config.validate()?;
         }
+        self.check_here(name)?;
         let _queue = self.making_sites.lock().await;
         match self.site(name).await {
             Ok(site) => {
@@ -85,20 +116,73 @@ impl App {
         self.site(name).await
     }
 
+    /// Refuses what another server serves.
+    pub(super) fn check_here(&self, name: &Name) -> Result<(), AppError> {
+        match self.serves.get() {
+            Some(serves) if !serves(name.as_str()) => Err(AppError::Elsewhere),
+            _ => Ok(()),
+        }
+    }
+
     /// An existing site.
     ///
     /// # Errors
-    /// [`AppError::NotFound`].
+    /// [`AppError::NotFound`]; [`AppError::Elsewhere`] when another server serves it.
     pub async fn site(self: &Arc<Self>, name: &Name) -> Result<Arc<Site>, AppError> {
-        if let Some(site) = self.sites.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
-            return Ok(Arc::clone(site));
+        self.check_here(name)?;
+        if let Some(site) = self.open_site(name) {
+            return Ok(site);
         }
-        let _queue = self.opening_sites.lock().await;
-        if let Some(site) = self.sites.lock().unwrap_or_else(PoisonError::into_inner).get(name) {
-            return Ok(Arc::clone(site));
+        let queue = OpeningQueue::of(self, name);
+        let _turn = queue.turns.lock().await;
+        match self.open_site(name) {
+            Some(site) => Ok(site),
+            None => self.open_stored_site(name).await,
         }
+    }
+
+    /// A site that this process has open. One whose handle has ended, since another server took the site over or the
+    /// store did not answer, is let go; asking for it again opens it anew.
+    fn open_site(&self, name: &Name) -> Option<Arc<Site>> {
+        let mut sites = self.sites.lock().unwrap_or_else(PoisonError::into_inner);
+        let site = sites.get(name)?;
+        if !site.store().is_over() {
+            return Some(Arc::clone(site));
+        }
+        tracing::warn!(site = %name, "this process has lost the site");
+        site.stop.cancel();
+        sites.remove(name);
+        None
+    }
+
+    /// Closes the sites that this server has open and is not to keep, since another one will serve them.
+    pub async fn let_go(&self, is_kept: impl Fn(&str) -> bool) {
+        let gone: Vec<(Name, Arc<Site>)> = {
+            let mut sites = self.sites.lock().unwrap_or_else(PoisonError::into_inner);
+            sites.extract_if(|name, _| !is_kept(name.as_str())).collect()
+        };
+        let close = gone.into_iter().map(|(name, site)| async move {
+            site.stop.cancel();
+            if let Err(error) = self.storage.release(name.as_str()).await {
+                tracing::warn!(site = %name, %error, "a site that moves away was not closed in order");
+            }
+        });
+        join_all(close).await;
+    }
+
+    /// Names of all sites of the storage, in order, whoever serves them.
+    ///
+    /// # Errors
+    /// Those of the storage.
+    pub async fn site_names(&self) -> Result<Vec<Name>, AppError> {
+        let names = self.storage.list().await?;
+        // A directory whose name no site can have is not ours.
+        Ok(names.iter().filter_map(|name| Name::new(name, "site").ok()).collect())
+    }
+
+    async fn open_stored_site(self: &Arc<Self>, name: &Name) -> Result<Arc<Site>, AppError> {
         // Opening makes what does not exist, so a request for an unknown site must not get that far.
-        if !self.storage.list().await?.iter().any(|known| known == name.as_str()) {
+        if !self.storage.contains(name.as_str()).await? {
             return Err(AppError::not_found("site", name));
         }
         let store = self.storage.open(name.as_str()).await?;
@@ -107,12 +191,17 @@ impl App {
                 .await?;
         let site = Arc::new(site);
         self.sites.lock().unwrap_or_else(PoisonError::into_inner).insert(name.clone(), Arc::clone(&site));
+        if let Err(error) = self.check_here(name) {
+            // It moved away while it was opened.
+            self.let_go(|site| site != name.as_str()).await;
+            return Err(error);
+        }
         self.work_on(&site);
         index_texts(&site);
         Ok(site)
     }
 
-    /// All sites that `is_wanted`, by name, those that cannot be opened left out.
+    /// All sites of this server that `is_wanted`, by name, those that cannot be opened left out.
     ///
     /// # Errors
     /// Those of the storage as a whole.
@@ -124,7 +213,7 @@ impl App {
         Ok(listed.into_iter().filter_map(|listed| listed.site.ok()).collect())
     }
 
-    /// All sites that `is_wanted`, by name; of those that cannot be opened, why not.
+    /// All sites of this server that `is_wanted`, by name; of those that cannot be opened, why not.
     ///
     /// # Errors
     /// Those of the storage as a whole.
@@ -132,20 +221,16 @@ impl App {
         self: &Arc<Self>,
         is_wanted: impl Fn(&str) -> bool,
     ) -> Result<Vec<ListedSite>, AppError> {
-        let mut sites = Vec::new();
-        for name in self.storage.list().await? {
-            // A directory whose name no site can have is not ours.
-            let Ok(name) = Name::new(&name, "site") else { continue };
-            if !is_wanted(name.as_str()) {
-                continue;
-            }
+        let mut names = self.site_names().await?;
+        names.retain(|name| is_wanted(name.as_str()) && self.check_here(name).is_ok());
+        let listed = stream::iter(names).map(|name| async move {
             match self.site(&name).await {
-                // Deleted between the listing and now, or its making was cut short.
-                Err(AppError::NotFound { .. }) => {}
-                site => sites.push(ListedSite { name, site }),
+                // Deleted or moved between the listing and now, or its making was cut short.
+                Err(AppError::NotFound { .. } | AppError::Elsewhere) => None,
+                site => Some(ListedSite { name, site }),
             }
-        }
-        Ok(sites)
+        });
+        Ok(listed.buffered(NUM_OPENED_AT_ONCE).filter_map(async |listed| listed).collect().await)
     }
 
     /// Changes how a site is mapped and asked, and how much of it is kept; answers the job that makes a map accordingly,
@@ -197,7 +282,7 @@ impl App {
         let _queue = self.making_sites.lock().await;
         match self.site(name).await {
             Ok(site) => site.stop.cancel(),
-            Err(AppError::NotFound { kind, name }) => return Err(AppError::NotFound { kind, name }),
+            Err(error @ (AppError::NotFound { .. } | AppError::Elsewhere)) => return Err(error),
             // A site that cannot be opened can still be deleted.
             Err(_) => {}
         }

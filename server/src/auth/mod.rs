@@ -58,6 +58,11 @@ pub async fn identify(State(gate): State<Arc<Gate>>, mut request: Request, next:
     response
 }
 
+/// Whether a request's sender is known; what it may do is another question.
+pub(crate) fn is_identified(request: &Request) -> bool {
+    request.extensions().get::<Caller>().is_some_and(|caller| caller.0.is_ok())
+}
+
 impl Gate {
     fn identify(&self, request: &Request) -> Result<Identity, ApiError> {
         if self.keys.is_empty() {

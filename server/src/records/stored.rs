@@ -126,8 +126,8 @@ impl SiteRecord {
     }
 }
 
-/// The layout of [`RunRecord`]; 1 said nothing of the readings.
-const RUN_LAYOUT: u8 = 2;
+/// The layout of [`RunRecord`]; 1 said nothing of the readings, 2 nothing of the area.
+const RUN_LAYOUT: u8 = 3;
 
 /// `Key::Run`: what a run is.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -138,6 +138,8 @@ pub struct RunRecord {
     pub robot: Option<String>,
     pub geometry: ScanGeometry,
     pub readings: ReadingRules,
+    /// Where the run belongs, when the client said.
+    pub area: Option<String>,
 }
 
 /// What the client said of the readings that the laser sends.
@@ -156,12 +158,21 @@ impl ReadingRules {
     }
 }
 
-/// [`RunRecord`] as runs stored it before.
+/// [`RunRecord`] as runs stored it first.
 #[derive(Serialize, Deserialize)]
 struct RunRecord1 {
     name: String,
     robot: Option<String>,
     geometry: ScanGeometry,
+}
+
+/// [`RunRecord`] before runs had an area.
+#[derive(Serialize, Deserialize)]
+struct RunRecord2 {
+    name: String,
+    robot: Option<String>,
+    geometry: ScanGeometry,
+    readings: ReadingRules,
 }
 
 impl RunRecord {
@@ -170,16 +181,21 @@ impl RunRecord {
         codec::encode_as(RUN_LAYOUT, self)
     }
 
-    /// The record behind its stored form, of either layout.
+    /// The record behind its stored form, of any layout.
     ///
     /// # Errors
     /// [`StorageError::Corrupt`].
     pub fn decode(bytes: &[u8]) -> Result<Self, StorageError> {
-        if codec::version_of(bytes) != Some(1) {
-            return codec::decode_as(RUN_LAYOUT, bytes, "a run");
-        }
-        let RunRecord1 { name, robot, geometry } = codec::decode_as(1, bytes, "a run")?;
-        Ok(Self { name, robot, readings: ReadingRules::of(&geometry), geometry })
+        let old = match codec::version_of(bytes) {
+            Some(1) => {
+                let RunRecord1 { name, robot, geometry } = codec::decode_as(1, bytes, "a run")?;
+                RunRecord2 { name, robot, readings: ReadingRules::of(&geometry), geometry }
+            }
+            Some(2) => codec::decode_as(2, bytes, "a run")?,
+            _ => return codec::decode_as(RUN_LAYOUT, bytes, "a run"),
+        };
+        let RunRecord2 { name, robot, geometry, readings } = old;
+        Ok(Self { name, robot, geometry, readings, area: None })
     }
 
     /// What stands in the place of a run that was deleted: numbers of runs are never used again. No run has such a name.
@@ -191,7 +207,7 @@ impl RunRecord {
             range_max_m: 1.0,
             robot_from_laser: Pose2::identity(),
         };
-        Self { name: String::new(), robot: None, readings: ReadingRules::of(&geometry), geometry }
+        Self { name: String::new(), robot: None, readings: ReadingRules::of(&geometry), geometry, area: None }
     }
 
     /// Whether the run was deleted.

@@ -16,11 +16,16 @@ fn sled_in(directory: &std::path::Path) -> SledStorage {
     SledStorage::new(SledConfig { directory: directory.to_owned(), cache_bytes_per_site: 1 << 20 }).unwrap()
 }
 
-/// Runs one law against both implementations.
+/// Runs one law against every implementation.
 async fn check<F: AsyncFn(&dyn Storage)>(law: F) {
     law(&MemoryStorage::default()).await;
     let directory = tempfile::tempdir().unwrap();
     law(&sled_in(directory.path())).await;
+    #[cfg(feature = "object-store")]
+    for storage in super::object::tests::storages().await {
+        law(&storage).await;
+        storage.close().await.unwrap();
+    }
 }
 
 fn batch_of(pairs: &[(&str, Option<&str>)]) -> Batch {
@@ -189,6 +194,26 @@ async fn sites_are_apart_and_a_deleted_one_is_fenced() {
         assert!(matches!(outcome, Err(StorageError::Fenced)));
         let fresh = storage.open("a").await.unwrap();
         assert_eq!(fresh.get(b"k").await.unwrap(), None);
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_released_site_ends_its_handles_and_is_opened_again_as_it_was() {
+    check(async |storage| {
+        let before = storage.open("a").await.unwrap();
+        before.commit(batch_of(&[("k", Some("kept"))]), vec![]).await.unwrap();
+        assert!(!before.is_over());
+        storage.release("a").await.unwrap();
+        storage.release("never").await.unwrap();
+        assert!(before.is_over());
+        assert!(matches!(before.get(b"k").await, Err(StorageError::Fenced)));
+        assert_eq!(storage.list().await.unwrap(), ["a"]);
+        assert!(storage.contains("a").await.unwrap() && !storage.contains("never").await.unwrap());
+        let after = storage.open("a").await.unwrap();
+        assert_eq!(after.get(b"k").await.unwrap().as_deref(), Some(&b"kept"[..]));
+        after.commit(batch_of(&[("k", Some("again"))]), vec![]).await.unwrap();
+        assert_eq!(after.get(b"k").await.unwrap().as_deref(), Some(&b"again"[..]));
     })
     .await;
 }

@@ -63,6 +63,10 @@ impl Storage for FaultyStorage {
         self.inner.delete(site).await
     }
 
+    async fn release(&self, site: &str) -> Result<(), StorageError> {
+        self.inner.release(site).await
+    }
+
     async fn close(&self) -> Result<(), StorageError> {
         self.inner.close().await
     }
@@ -112,5 +116,9 @@ impl SiteStore for FaultySite {
 
     async fn num_bytes_on_disk(&self) -> Result<u64, StorageError> {
         self.inner.num_bytes_on_disk().await
+    }
+
+    fn is_over(&self) -> bool {
+        self.inner.is_over()
     }
 }

@@ -22,12 +22,12 @@ pub struct MemoryStorage {
 struct MemorySite {
     // Commits replace the map instead of changing it while a snapshot shares it.
     map: Mutex<Arc<Map>>,
-    is_deleted: AtomicBool,
+    is_over: AtomicBool,
 }
 
 impl MemorySite {
     fn map(&self) -> Result<MutexGuard<'_, Arc<Map>>, StorageError> {
-        if self.is_deleted.load(Ordering::Acquire) {
+        if self.is_over.load(Ordering::Acquire) {
             return Err(StorageError::Fenced);
         }
         Ok(lock(&self.map))
@@ -46,7 +46,16 @@ impl Storage for MemoryStorage {
 
     async fn delete(&self, site: &str) -> Result<(), StorageError> {
         if let Some(store) = lock(&self.sites).remove(site) {
-            store.is_deleted.store(true, Ordering::Release);
+            store.is_over.store(true, Ordering::Release);
+        }
+        Ok(())
+    }
+
+    async fn release(&self, site: &str) -> Result<(), StorageError> {
+        if let Some(store) = lock(&self.sites).get_mut(site) {
+            let map = Arc::clone(&lock(&store.map));
+            let again = MemorySite { map: Mutex::new(map), is_over: AtomicBool::new(false) };
+            std::mem::replace(store, Arc::new(again)).is_over.store(true, Ordering::Release);
         }
         Ok(())
     }
@@ -96,6 +105,10 @@ impl SiteStore for MemorySite {
 
     async fn num_bytes_on_disk(&self) -> Result<u64, StorageError> {
         Ok(self.map()?.iter().map(|(key, value)| (key.len() + value.len()) as u64).sum())
+    }
+
+    fn is_over(&self) -> bool {
+        self.is_over.load(Ordering::Acquire)
     }
 }
 

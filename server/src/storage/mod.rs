@@ -3,6 +3,7 @@
 //! ```text
 //! app ──► Storage::open(site) ──► SiteStore: get · multi_get · scan · commit(batch, preconditions) · snapshot
 //!                                   ├── SledStorage    embedded, one database per site, the default
+//!                                   ├── ObjectStorage  an object store that several servers share
 //!                                   └── MemoryStorage  the tests' twin, forgets everything
 //! ```
 //!
@@ -31,6 +32,8 @@ mod files;
 mod ledger;
 #[cfg(test)]
 mod memory;
+#[cfg(feature = "object-store")]
+pub mod object;
 mod sled_database;
 mod sled_flusher;
 mod sled_log;
@@ -171,6 +174,10 @@ pub trait SiteStore: Reader {
 
     /// Bytes this site occupies on disk, as well as the engine can tell.
     async fn num_bytes_on_disk(&self) -> Result<u64, StorageError>;
+
+    /// Whether this handle has ended and answers nothing but [`StorageError::Fenced`]: the site was deleted, released,
+    /// or taken over by another process. Opening the site again gives another handle.
+    fn is_over(&self) -> bool;
 }
 
 /// A database of sites.
@@ -181,6 +188,15 @@ pub trait Storage: Send + Sync {
 
     /// Names of all sites in byte order.
     async fn list(&self) -> Result<Vec<String>, StorageError>;
+
+    /// Whether there is a site of a name; cheaper than [`Storage::list`] where that costs.
+    async fn contains(&self, site: &str) -> Result<bool, StorageError> {
+        Ok(self.list().await?.iter().any(|known| known == site))
+    }
+
+    /// Ends the handles of a site, as when another process is to serve it; they answer [`StorageError::Fenced`].
+    /// Everything stays stored, and opening the site again is allowed.
+    async fn release(&self, site: &str) -> Result<(), StorageError>;
 
     /// Forgets a site and everything in it; handles that are still held answer [`StorageError::Fenced`].
     async fn delete(&self, site: &str) -> Result<(), StorageError>;

@@ -76,6 +76,10 @@ impl SledSite {
         }
     }
 
+    pub(super) fn is_over(&self) -> bool {
+        matches!(&*self.state.lock().unwrap_or_else(PoisonError::into_inner), State::Fenced)
+    }
+
     /// Ends the life of every handle; the database as it was.
     pub(super) fn fence(&self) -> Option<Arc<Database>> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -146,5 +150,9 @@ impl SiteStore for SledHandle {
 
     async fn num_bytes_on_disk(&self) -> Result<u64, StorageError> {
         self.blocking(|db| db.db.size_on_disk().map_err(|error| db.sled_error(error))).await
+    }
+
+    fn is_over(&self) -> bool {
+        self.site.is_over()
     }
 }

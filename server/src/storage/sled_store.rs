@@ -93,6 +93,15 @@ impl Sites {
         Ok(store)
     }
 
+    fn release_blocking(&self, site: &str) -> Result<(), StorageError> {
+        let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
+        let open = open.as_mut().ok_or_else(closed)?;
+        match open.sites.remove(site).and_then(|store| store.fence()) {
+            Some(database) => database.close(),
+            None => Ok(()),
+        }
+    }
+
     fn delete_blocking(&self, site: &str) -> Result<(), StorageError> {
         let mut open = self.open.lock().unwrap_or_else(PoisonError::into_inner);
         let open = open.as_mut().ok_or_else(closed)?;
@@ -119,6 +128,11 @@ impl Storage for SledStorage {
     async fn delete(&self, site: &str) -> Result<(), StorageError> {
         let site = site.to_owned();
         self.blocking(move |sites| sites.delete_blocking(&site)).await
+    }
+
+    async fn release(&self, site: &str) -> Result<(), StorageError> {
+        let site = site.to_owned();
+        self.blocking(move |sites| sites.release_blocking(&site)).await
     }
 
     async fn close(&self) -> Result<(), StorageError> {

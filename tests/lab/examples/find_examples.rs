@@ -184,6 +184,7 @@ fn index_of(part: &Part, config: &EngineConfig) -> Result<(PlaceIndex, Vec<(Pose
         observations: &observations,
         words: &[],
         keyframes: &keyframes,
+        area: None,
     };
     let map = map_site(&config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
     let mapped = &map.runs[0];

@@ -119,6 +119,7 @@ impl Driven {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: None,
         }
     }
 

@@ -248,6 +248,7 @@ fn judge(
             observations: &driven.observations,
             words: &driven.words,
             keyframes: &driven.keyframes,
+            area: None,
         };
         let map = map_site(&options.config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
         let poses = map

@@ -174,7 +174,7 @@ fn the_storage_engine_stays_behind_its_trait() {
         .into_iter()
         .filter(|source| !source.path.to_string_lossy().contains("storage"))
         .collect();
-    check(forbid(&above, &["sled::"]));
+    check(forbid(&above, &["sled::", "slatedb::"]));
 }
 
 #[test]

@@ -202,7 +202,7 @@ async fn trial(
 ) -> Result<LocalizationTrial> {
     let recording = &log.recording;
     let geometry = wire_geometry(&recording.log.geometry);
-    let robot = NewLocalization { robot: Some("evaluation".into()), geometry, prior: None };
+    let robot = NewLocalization { robot: Some("evaluation".into()), geometry, prior: None, area: None };
     let opened = client.open_localization(SITE, &robot).await.context("a localisation cannot be opened")?;
     let mut next = start;
     let mut answered = None;

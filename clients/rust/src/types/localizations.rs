@@ -96,6 +96,9 @@ pub struct NewLocalization {
     /// Where the robot is said to be when the session begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PosePrior>,
+    /// The area it is said to be in.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<String>,
 }
 
 /// What speaks for and against a place, by the stage that found it.

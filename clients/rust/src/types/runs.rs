@@ -43,6 +43,9 @@ pub struct Run {
     pub run: String,
     /// The robot.
     pub robot: Option<String>,
+    /// Where it belongs, when somebody said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<String>,
     /// The laser.
     pub geometry: Geometry,
     /// Whether it takes more scans.
@@ -108,6 +111,9 @@ pub struct NewRun {
     pub robot: Option<String>,
     /// Its laser.
     pub geometry: Geometry,
+    /// Where the run belongs, for instance a floor: it is never joined to runs of another area.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<String>,
 }
 
 /// JSON has neither NaN nor infinity: "no return" is `null` there, and infinity here; "too near" is 0 there.

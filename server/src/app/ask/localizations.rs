@@ -3,7 +3,7 @@
 //! A session looks for the robot in every component of the map version that served when it began, up to a few. What it
 //! searches, weighs and says is [`SiteSession`]'s; here are only the table of sessions and what they read of the store.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -38,6 +38,15 @@ pub struct LocalizationInfo {
     pub estimate: LocalizationEstimate,
     /// It is forgotten when it gets no scans for so long.
     pub expires_in: Duration,
+}
+
+/// What is said of where the robot is when a session begins.
+#[derive(Clone, Debug, Default)]
+pub struct Declared {
+    /// About where.
+    pub prior: Option<PosePrior>,
+    /// In which area.
+    pub area: Option<String>,
 }
 
 /// The sessions of this process.
@@ -82,7 +91,8 @@ impl Search {
 }
 
 impl App {
-    /// Opens a session in the serving map, for an owner who may have a limit of his own; a rough pose may be declared.
+    /// Opens a session in the serving map, for an owner who may have a limit of his own; a rough pose and an area may be
+    /// declared.
     ///
     /// # Errors
     /// [`AppError::Invalid`] for a laser that cannot be worked with, [`AppError::NotReady`] before the first build,
@@ -91,13 +101,13 @@ impl App {
         &self,
         site: &Site,
         (geometry, readings): (ScanGeometry, ReadingRules),
-        prior: Option<PosePrior>,
+        declared: Declared,
         owner: Arc<str>,
         num_own_max: Option<usize>,
     ) -> Result<LocalizationInfo, AppError> {
         Translator::new(&site.state().config.translator, geometry.clone()).map_err(invalid_geometry)?;
         let map = site.map(None).await?;
-        let search = self.new_search(site, &map, &geometry, prior).await?;
+        let search = self.new_search(site, &map, &geometry, declared).await?;
         let session = Session {
             site: site.birth(),
             owner,
@@ -204,11 +214,22 @@ impl App {
         site: &Site,
         map: &Map,
         geometry: &ScanGeometry,
-        prior: Option<PosePrior>,
+        Declared { prior, area }: Declared,
     ) -> Result<Search, AppError> {
         let mut sizes: BTreeMap<u32, u64> = BTreeMap::new();
+        let mut of_area = BTreeSet::new();
         for run in map.record.runs.iter().filter(|run| run.num_poses > 0) {
             *sizes.entry(run.component).or_default() += run.num_poses;
+            if area.is_some() && site.reader().run(run.run).await?.record.area == area {
+                of_area.insert(run.component);
+            }
+        }
+        if let Some(area) = area {
+            if of_area.is_empty() {
+                let problem = format!("the map has no run of the area `{area}`");
+                return Err(AppError::invalid("area", problem));
+            }
+            sizes.retain(|component, _| of_area.contains(component));
         }
         let mut largest: Vec<u32> = sizes.keys().copied().collect();
         largest.sort_by_key(|component| std::cmp::Reverse(sizes[component]));

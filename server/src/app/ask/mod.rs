@@ -5,5 +5,5 @@ mod localizations;
 mod words;
 
 pub use examples::{ExampleInfo, PlaceIndexes};
-pub use localizations::{LocalizationInfo, Localizations};
+pub use localizations::{Declared, LocalizationInfo, Localizations};
 pub use words::{WordAnswer, find_words};

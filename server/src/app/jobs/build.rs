@@ -47,6 +47,7 @@ impl LoadedRun {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: self.run.record.area.as_deref(),
         }
     }
 }

@@ -16,11 +16,16 @@ pub struct NewRun {
     pub geometry: ScanGeometry,
     /// What is said of its readings, checked.
     pub readings: ReadingRules,
+    /// Where the run belongs; it is never joined to runs of another area.
+    pub area: Option<String>,
 }
 
 impl NewRun {
     fn is_like(&self, run: &RunRecord) -> bool {
-        run.geometry == self.geometry && run.robot == self.robot && run.readings == self.readings
+        run.geometry == self.geometry
+            && run.robot == self.robot
+            && run.readings == self.readings
+            && run.area == self.area
     }
 }
 
@@ -28,13 +33,13 @@ impl App {
     /// Makes a run or finds it as it stands; true when it was made.
     ///
     /// # Errors
-    /// [`AppError::Exists`] when the run stands with another geometry or robot, [`AppError::Invalid`] when the site
+    /// [`AppError::Exists`] when the run stands with another geometry, robot or area, [`AppError::Invalid`] when the site
     /// is full.
     pub async fn make_run(&self, site: &Site, name: &Name, new: NewRun) -> Result<(Run, bool), AppError> {
         match site.run(name).await {
             Ok(run) if new.is_like(&run.record) => Ok((run, false)),
             Ok(_) => {
-                let detail = format!("the run `{name}` stands with another geometry or robot");
+                let detail = format!("the run `{name}` stands with another geometry, robot or area");
                 Err(AppError::Exists { detail })
             }
             Err(AppError::NotFound { .. }) => {
@@ -49,8 +54,8 @@ impl App {
 
     async fn create_run(&self, site: &Site, name: &Name, new: NewRun) -> Result<(Run, bool), AppError> {
         let num_runs_max = self.config().limits.num_runs_per_site_max;
-        let NewRun { robot, geometry, readings } = new;
-        let run = RunRecord { name: name.to_string(), robot, geometry, readings };
+        let NewRun { robot, geometry, readings, area } = new;
+        let run = RunRecord { name: name.to_string(), robot, geometry, readings, area };
         let create = |record: &mut SiteRecord, batch: &mut Batch| {
             if record.num_runs - record.num_deleted_runs >= num_runs_max {
                 return Err(AppError::invalid(

@@ -89,6 +89,15 @@ pub struct RotateParams {
     pub grace_s: Option<u64>,
 }
 
+/// Keys that the API makes are known to one server only.
+fn check_alone(state: &AppState) -> Result<(), ApiError> {
+    if state.elsewhere.is_none() {
+        return Ok(());
+    }
+    let detail = "servers that share an object store take their keys from the configuration; change it and send SIGHUP";
+    Err(ApiError::new(StatusCode::CONFLICT, "configured-keys", "Keys stand in the configuration", detail))
+}
+
 impl KeyDto {
     fn of(record: &IssuedKey, is_configured: bool) -> Self {
         let key = &record.key;
@@ -146,6 +155,7 @@ pub async fn make_key(
     Extension(identity): Extension<Identity>,
     Body(new): Body<NewKeyDto>,
 ) -> Result<(StatusCode, Json<IssuedKeyDto>), ApiError> {
+    check_alone(&state)?;
     let (key, by) = (new.check()?, identity.clone());
     let (record, secret) = on_blocking_thread(move || state.gate.keys.issue(&by, key)).await??;
     tracing::info!(target: "locution::audit", event = "key made", name = record.key.name, by = %identity.name());
@@ -176,6 +186,7 @@ pub async fn rotate_key(
     Path(name): Path<String>,
     Params(params): Params<RotateParams>,
 ) -> Result<Json<IssuedKeyDto>, ApiError> {
+    check_alone(&state)?;
     let grace_s = params.grace_s.unwrap_or(0).min(LIFE_MAX_S);
     let by = identity.clone();
     let (record, secret) = on_blocking_thread(move || state.gate.keys.rotate(&by, &name, grace_s)).await??;
@@ -193,6 +204,7 @@ pub async fn revoke_key(
     Extension(identity): Extension<Identity>,
     Path(name): Path<String>,
 ) -> Result<StatusCode, ApiError> {
+    check_alone(&state)?;
     let (by, revoked) = (identity.clone(), name.clone());
     on_blocking_thread(move || state.gate.keys.revoke(&by, &revoked)).await??;
     tracing::info!(target: "locution::audit", event = "key revoked", name, by = %identity.name());

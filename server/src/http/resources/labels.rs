@@ -1,6 +1,8 @@
 //! Labelled places, and questions in their words.
 
 use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use locution_engine::semantics::{LabelPattern, PlaceLabel};
 use serde::{Deserialize, Serialize};
@@ -9,6 +11,7 @@ use utoipa::{IntoParams, ToSchema};
 use crate::app::maps::{DrivenStretch, LabelAnswer, find_labels, labels};
 use crate::app::{AppError, Name};
 use crate::auth::Identity;
+use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, Paged, SiteOf};
 use crate::http::values::{Page, PageParams, PoseDto, one_of, window};
@@ -256,10 +259,14 @@ pub async fn query_labels(
 pub async fn query_labels_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
+    headers: HeaderMap,
     Body(query): Body<LabelQueryDto>,
-) -> Result<Json<Vec<LabelAnswerDto>>, ApiError> {
+) -> Result<impl IntoResponse, ApiError> {
     let (patterns, limit) = query.check()?;
-    let mut answers = Vec::new();
+    let elsewhere =
+        Answers::<Vec<LabelAnswerDto>>::to(&state, &identity, "/queries/labels", &headers, &query).await?;
+    let unanswered = elsewhere.as_header();
+    let mut answers: Vec<_> = elsewhere.found.into_iter().flatten().collect();
     for site in state.app.sites(|name| identity.may_see(name)).await? {
         let map = match site.map(None).await {
             Err(AppError::NotReady { .. }) => continue,
@@ -267,9 +274,8 @@ pub async fn query_labels_everywhere(
         };
         let found = find_labels(&map, &patterns, limit).await?;
         answers.extend(found.into_iter().map(|answer| LabelAnswerDto::new(site.name(), answer)));
-        // A site's best come first, so what is cut off here cannot be among the best of all.
-        answers.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
-        answers.truncate(limit);
     }
-    Ok(Json(answers))
+    answers.sort_by(|a, b| b.confidence.total_cmp(&a.confidence));
+    answers.truncate(limit);
+    Ok((unanswered, Json(answers)))
 }

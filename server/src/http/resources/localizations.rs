@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use axum::extract::State;
-use axum::http::StatusCode;
-use axum::response::Response;
+use axum::http::{HeaderMap, StatusCode};
+use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use locution_engine::geometry::Pose2;
 use locution_engine::locate::{Hypothesis, LocalizationState, Missing, PosePrior};
@@ -13,11 +13,12 @@ use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::batches::{BatchDto, ScanDto, checked_batch};
-use super::runs::GeometryDto;
+use super::runs::{GeometryDto, check_area};
 use crate::app::AppError;
-use crate::app::ask::{ExampleInfo, LocalizationInfo};
+use crate::app::ask::{Declared, ExampleInfo, LocalizationInfo};
 use crate::app::runs::NewBatch;
 use crate::auth::Identity;
+use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, IdOf, NoParams, Paged, SiteOf};
 use crate::http::values::{ChannelDto, DirectionDto, Page, PageParams, PoseDto};
@@ -35,6 +36,10 @@ pub struct NewLocalizationDto {
     /// Where the robot is said to be when the session begins.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub prior: Option<PosePriorDto>,
+    /// The area it is said to be in: only components with a run of this area are looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "second floor", min_length = 1, max_length = 256)]
+    pub area: Option<String>,
 }
 
 /// A rough pose that a person or another system declares. It is weighed, not believed.
@@ -323,8 +328,10 @@ pub async fn open_localization(
 ) -> Result<Response, ApiError> {
     let laser = new.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
     let prior = new.prior.as_ref().map(PosePriorDto::check).transpose()?;
+    check_area(new.area.as_ref())?;
+    let declared = Declared { prior, area: new.area };
     let (owner, num_own_max) = (Arc::clone(identity.name()), identity.num_localizations_max());
-    let info = state.app.open_localization(&site, laser, prior, owner, num_own_max).await?;
+    let info = state.app.open_localization(&site, laser, declared, owner, num_own_max).await?;
     let location = format!("/v1/sites/{}/localisations/{}", site.name(), info.id);
     Ok(with_location(&location, (StatusCode::CREATED, Json(LocalizationDto::from(info)))))
 }
@@ -403,10 +410,20 @@ pub async fn query_example(
 pub async fn query_example_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
+    headers: HeaderMap,
     Body(query): Body<ExampleQueryDto>,
-) -> Result<Json<Vec<ExampleAnswerDto>>, ApiError> {
+) -> Result<impl IntoResponse, ApiError> {
     let (geometry, readings) = query.geometry.check(state.app.config().limits.num_ranges_per_scan_max)?;
+    let elsewhere =
+        Answers::<ExampleAnswerDto>::to(&state, &identity, "/queries/example", &headers, &query).await?;
     let sites = state.app.sites(|name| identity.may_see(name)).await?;
     let answers = state.app.find_example(&sites, (&geometry, &readings), query.batch()?).await?;
-    Ok(Json(answers.into_iter().map(ExampleAnswerDto::from).collect()))
+    let unanswered = elsewhere.as_header();
+    let mut answers: Vec<_> = answers.into_iter().map(ExampleAnswerDto::from).collect();
+    if !elsewhere.found.is_empty() {
+        let best = |answer: &ExampleAnswerDto| answer.places.first().map_or(0.0, |place| place.probability);
+        answers.extend(elsewhere.found);
+        answers.sort_by(|a, b| best(b).total_cmp(&best(a)));
+    }
+    Ok((unanswered, Json(answers)))
 }

@@ -132,6 +132,22 @@ pub struct NewRunDto {
     pub robot: Option<String>,
     /// The laser.
     pub geometry: GeometryDto,
+    /// Where the run belongs, for instance a floor: it is never joined to runs of another area. Floors that look alike
+    /// cannot be told apart by a laser.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = "second floor", min_length = 1, max_length = 256)]
+    pub area: Option<String>,
+}
+
+/// An area as it may be named.
+///
+/// # Errors
+/// 422 for a name that is empty or too long.
+pub fn check_area(area: Option<&String>) -> Result<(), ApiError> {
+    if area.is_some_and(|area| area.is_empty() || area.len() > 256) {
+        return Err(ApiError::invalid("area", "1 to 256 bytes"));
+    }
+    Ok(())
 }
 
 impl NewRunDto {
@@ -144,7 +160,8 @@ impl NewRunDto {
             return Err(ApiError::invalid("robot", "at most 256 bytes"));
         }
         let (geometry, readings) = self.geometry.check(num_ranges_max)?;
-        Ok(NewRun { robot: self.robot, geometry, readings })
+        check_area(self.area.as_ref())?;
+        Ok(NewRun { robot: self.robot, geometry, readings, area: self.area })
     }
 }
 
@@ -166,6 +183,9 @@ pub struct RunDto {
     pub run: String,
     /// The robot.
     pub robot: Option<String>,
+    /// Where it belongs, when the client said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub area: Option<String>,
     /// The laser.
     pub geometry: GeometryDto,
     /// Whether it takes more scans.
@@ -185,6 +205,7 @@ impl From<Run> for RunDto {
         Self {
             run: run.record.name.clone(),
             robot: run.record.robot.clone(),
+            area: run.record.area.clone(),
             geometry: GeometryDto::of(&run.record.geometry, &run.record.readings),
             state: if run.head.is_finished { RunStateDto::Finished } else { RunStateDto::Open },
             next_sequence: run.head.next_sequence,

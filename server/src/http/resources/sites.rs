@@ -1,7 +1,9 @@
 //! Sites: namespaces in which places are matched.
 
+use std::collections::BTreeSet;
+
 use axum::extract::State;
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use locution_engine::config::EngineConfig;
@@ -10,8 +12,9 @@ use utoipa::ToSchema;
 
 use super::jobs::JobDto;
 use crate::app::site::SiteInfo;
-use crate::app::{AppError, ListedSite};
+use crate::app::{AppError, ListedSite, Name};
 use crate::auth::Identity;
+use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, SiteName, SiteOf};
 use crate::http::values::{Page, PageParams};
@@ -224,6 +227,23 @@ impl SiteSummaryDto {
     }
 }
 
+impl From<SiteDto> for SiteSummaryDto {
+    fn from(site: SiteDto) -> Self {
+        Self {
+            site: site.site,
+            state: SiteStateDto::Serving,
+            reason: None,
+            num_runs: site.num_runs,
+            num_scans: site.num_scans,
+            num_observations: site.num_observations,
+            num_words: site.num_words,
+            bytes_on_disk: site.bytes_on_disk,
+            generation: site.generation,
+            map_version: site.map_version,
+        }
+    }
+}
+
 impl From<SiteInfo> for SiteDto {
     fn from(info: SiteInfo) -> Self {
         let summary = SiteSummaryDto::from(&info);
@@ -276,15 +296,38 @@ fn parse_config(config: serde_json::Value) -> Result<EngineConfig, ApiError> {
 pub async fn list_sites(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
+    headers: HeaderMap,
     Paged(NoParams {}, page): Paged<NoParams>,
 ) -> Result<Json<Page<SiteSummaryDto>>, ApiError> {
-    let sites = state.app.listed_sites(|name| identity.may_see(name)).await?;
-    let num_sites = sites.len() as u64;
+    let skipped = usize::try_from(page.first).unwrap_or(usize::MAX);
     let mut items = Vec::new();
-    for listed in sites.into_iter().skip(usize::try_from(page.first).unwrap_or(usize::MAX)).take(page.limit) {
+    let Some(elsewhere) = &state.elsewhere else {
+        let sites = state.app.listed_sites(|name| identity.may_see(name)).await?;
+        let num_sites = sites.len() as u64;
+        for listed in sites.into_iter().skip(skipped).take(page.limit) {
+            items.push(SiteSummaryDto::of(listed).await);
+        }
+        return Ok(Json(Page::of(items, page.first, num_sites)));
+    };
+    let mut names = state.app.site_names().await?;
+    names.retain(|name| identity.may_see(name.as_str()));
+    let num_sites = names.len() as u64;
+    let names: BTreeSet<Name> = names.into_iter().skip(skipped).take(page.limit).collect();
+    let far = names.iter().filter(|name| !elsewhere.serves(name.as_str())).cloned().collect();
+    let answers = Answers::<SiteDto>::read(elsewhere.ask(far, "", &headers, None).await);
+    items.extend(answers.found.into_iter().map(SiteSummaryDto::from));
+    let silent = "its server does not answer, or it is moving between servers";
+    items.extend(
+        answers.unanswered.iter().map(|name| SiteSummaryDto::unreadable(name.to_string(), silent.into())),
+    );
+    for listed in state.app.listed_sites(|name| names.iter().any(|wanted| wanted.as_str() == name)).await? {
         items.push(SiteSummaryDto::of(listed).await);
     }
-    Ok(Json(Page::of(items, page.first, num_sites)))
+    items.sort_by(|a, b| a.site.cmp(&b.site));
+    // One that moved between the two questions is among both answers.
+    items.dedup_by(|a, b| a.site == b.site);
+    let next = page.first + names.len() as u64;
+    Ok(Json(Page { items, next_cursor: (next < num_sites).then(|| next.to_string()) }))
 }
 
 /// One site.

@@ -1,6 +1,8 @@
 //! Questions by word pattern.
 
 use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::IntoResponse;
 use axum::{Extension, Json};
 use locution_engine::index::WordPattern;
 use serde::{Deserialize, Serialize};
@@ -8,6 +10,7 @@ use utoipa::ToSchema;
 
 use crate::app::ask::{WordAnswer, find_words};
 use crate::auth::Identity;
+use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, SiteOf};
 use crate::http::values::{DirectionDto, PoseDto};
@@ -147,10 +150,14 @@ pub async fn query_words(
 pub async fn query_words_everywhere(
     State(state): State<AppState>,
     Extension(identity): Extension<Identity>,
+    headers: HeaderMap,
     Body(query): Body<WordQueryDto>,
-) -> Result<Json<Vec<WordAnswerDto>>, ApiError> {
+) -> Result<impl IntoResponse, ApiError> {
     let (patterns, limit) = query.check()?;
-    let mut answers = Vec::new();
+    let elsewhere =
+        Answers::<Vec<WordAnswerDto>>::to(&state, &identity, "/queries/words", &headers, &query).await?;
+    let unanswered = elsewhere.as_header();
+    let mut answers: Vec<_> = elsewhere.found.into_iter().flatten().collect();
     for site in state.app.sites(|name| identity.may_see(name)).await? {
         let name = site.name().as_str();
         let found = find_words(&site, &patterns, limit).await?;
@@ -158,5 +165,5 @@ pub async fn query_words_everywhere(
     }
     answers.sort_by(|a, b| b.fit.total_cmp(&a.fit));
     answers.truncate(limit);
-    Ok(Json(answers))
+    Ok((unanswered, Json(answers)))
 }

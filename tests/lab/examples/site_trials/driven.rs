@@ -112,6 +112,7 @@ impl Driven {
             observations: &self.observations,
             words: &self.words,
             keyframes: &self.keyframes,
+            area: None,
         }
     }
 }
@@ -119,13 +120,16 @@ impl Driven {
 /// A drive that was kept, or made now and kept for the next trial.
 fn kept(name: &str, make: impl FnOnce() -> Result<Driven, Failure>) -> Result<Driven, Failure> {
     let Some(folder) = std::env::var_os("LOCUTION_DRIVES").map(PathBuf::from) else { return make() };
-    let path = folder.join(format!("{name}.json"));
+    let path = folder.join(format!("{name}.cbor"));
     if let Ok(bytes) = std::fs::read(&path) {
-        return Ok(serde_json::from_slice(&bytes)?);
+        return Ok(ciborium::from_reader(bytes.as_slice())?);
     }
     let run = make()?;
     std::fs::create_dir_all(&folder)?;
-    std::fs::write(&path, serde_json::to_vec(&run)?)?;
+    // JSON has no word for a reading that is not a number.
+    let mut bytes = Vec::new();
+    ciborium::into_writer(&run, &mut bytes)?;
+    std::fs::write(&path, bytes)?;
     Ok(run)
 }
 

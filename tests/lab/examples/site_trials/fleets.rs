@@ -98,7 +98,7 @@ fn misplaced_m(runs: &[Driven], map: &SiteMap, first: usize, second: usize) -> f
 }
 
 /// The rigid motion that lays poses best over the truth.
-fn world_from_map(truth: &[Pose2], poses: &[Pose2]) -> Pose2 {
+pub fn world_from_map(truth: &[Pose2], poses: &[Pose2]) -> Pose2 {
     let num = poses.len() as f64;
     let mean =
         |of: &[Pose2]| of.iter().fold((0.0, 0.0), |sum, pose| (sum.0 + pose.x / num, sum.1 + pose.y / num));

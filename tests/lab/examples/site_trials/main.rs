@@ -5,7 +5,8 @@
 //! - `strangers 200 ipa-lab-a ipa-office-a`: one robot in each world, all in one site; nothing may be joined.
 //! - `recordings wean1 wean3 intel/1/2 intel/2/2`: recordings or parts of them in one site, judged by their truth.
 //! - `order recordings wean1 wean3 wean4`, `order fleet ipa-lab-a 200`: every order must give the same map.
-//! - `growth 5 ipa-lab-a`: so many runs of 80 m in a world and its furnished twin, three people walking.
+//! - `growth 20 ipa-lab-a`: so many runs of 80 m in a world and its furnished twin, three people walking; one is added
+//!   after the other, a line for each, and in the end all are mapped from nothing.
 //!
 //! A line of JSON for every site, a sum at the end. `LOCUTION_DATASETS` says where worlds and recordings are;
 //! `LOCUTION_DRIVES` names a folder in which drives are kept, for trials of the map builder alone: empty it when
@@ -13,6 +14,7 @@
 
 mod driven;
 mod fleets;
+mod growth;
 mod order;
 
 use driven::Driven;
@@ -49,7 +51,7 @@ fn main() -> Result<(), Failure> {
             println!("{}", serde_json::to_string(&judged(&names.join(" "), &runs, &map, seconds))?);
             Ok(())
         }
-        ["growth", num_runs, world] => growth(num_runs.parse()?, world),
+        ["growth", num_runs, world] => growth::grow(num_runs.parse()?, world),
         _ => {
             Err(anyhow::anyhow!("say fleets, strangers, order or growth; the head of the program tells how"))
         }
@@ -90,25 +92,5 @@ fn strangers(seed: u64, worlds: &[&str]) -> Result<(), Failure> {
     let (map, seconds) = mapped(&runs)?;
     let report = judged(&format!("strangers {seed}"), &runs, &map, seconds);
     println!("{}", serde_json::to_string(&report)?);
-    Ok(())
-}
-
-fn growth(num_runs: u64, world: &str) -> Result<(), Failure> {
-    let runs = (0..num_runs)
-        .map(|run| {
-            let world = if run % 2 == 0 { world.to_owned() } else { format!("{world}-furniture") };
-            let mut run = Driven::wandering(&world, 80.0, 3, 500 + run)?;
-            run.place = "same".to_owned();
-            Ok::<_, Failure>(run)
-        })
-        .collect::<Result<Vec<_>, Failure>>()?;
-    let (map, seconds) = mapped(&runs)?;
-    let report = judged(&format!("{world} growth {num_runs}"), &runs, &map, seconds);
-    println!(
-        "{} matches, {} refused, {}",
-        map.matches.len(),
-        map.refused.len(),
-        serde_json::to_string(&report)?
-    );
     Ok(())
 }

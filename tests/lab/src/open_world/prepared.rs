@@ -113,6 +113,7 @@ impl PreparedMap {
             observations: &observations,
             words: &[],
             keyframes: &keyframes,
+            area: None,
         };
         let kept = cache.map(|folder| folder.join(format!("{}.json", part.name)));
         let map_from_keyframes = match &kept {
@@ -133,6 +134,7 @@ impl PreparedMap {
             observations: &observations,
             words: &[],
             keyframes: &keyframes,
+            area: None,
         };
         let mut builder = PlaceIndexBuilder::new(&config.recall);
         let map_from_observations = place_observations(&record, &mapped);

@@ -23,11 +23,14 @@ class NewLocalization:
         geometry (Geometry): What all scans of a run share.
         robot (None | str | Unset): The robot, for the log.
         prior (None | PosePrior | Unset):
+        area (None | str | Unset): The area it is said to be in: only components with a run of this area are looked at.
+            Example: second floor.
     """
 
     geometry: Geometry
     robot: None | str | Unset = UNSET
     prior: None | PosePrior | Unset = UNSET
+    area: None | str | Unset = UNSET
 
     def to_dict(self) -> dict[str, Any]:
         from ..models.pose_prior import PosePrior  # noqa: PLC0415
@@ -48,6 +51,12 @@ class NewLocalization:
         else:
             prior = self.prior
 
+        area: None | str | Unset
+        if isinstance(self.area, Unset):
+            area = UNSET
+        else:
+            area = self.area
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -59,6 +68,8 @@ class NewLocalization:
             field_dict["robot"] = robot
         if prior is not UNSET:
             field_dict["prior"] = prior
+        if area is not UNSET:
+            field_dict["area"] = area
 
         return field_dict
 
@@ -96,10 +107,20 @@ class NewLocalization:
 
         prior = _parse_prior(d.pop("prior", UNSET))
 
+        def _parse_area(data: object) -> None | str | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(None | str | Unset, data)
+
+        area = _parse_area(d.pop("area", UNSET))
+
         new_localization = cls(
             geometry=geometry,
             robot=robot,
             prior=prior,
+            area=area,
         )
 
         return new_localization

@@ -21,10 +21,14 @@ class NewRun:
     Attributes:
         geometry (Geometry): What all scans of a run share.
         robot (None | str | Unset): The robot, when there is more to say than the run's name. Example: porter-3.
+        area (None | str | Unset): Where the run belongs, for instance a floor: it is never joined to runs of another
+            area. Floors that look alike
+            cannot be told apart by a laser. Example: second floor.
     """
 
     geometry: Geometry
     robot: None | str | Unset = UNSET
+    area: None | str | Unset = UNSET
 
     def to_dict(self) -> dict[str, Any]:
         geometry = self.geometry.to_dict()
@@ -35,6 +39,12 @@ class NewRun:
         else:
             robot = self.robot
 
+        area: None | str | Unset
+        if isinstance(self.area, Unset):
+            area = UNSET
+        else:
+            area = self.area
+
         field_dict: dict[str, Any] = {}
 
         field_dict.update(
@@ -44,6 +54,8 @@ class NewRun:
         )
         if robot is not UNSET:
             field_dict["robot"] = robot
+        if area is not UNSET:
+            field_dict["area"] = area
 
         return field_dict
 
@@ -63,9 +75,19 @@ class NewRun:
 
         robot = _parse_robot(d.pop("robot", UNSET))
 
+        def _parse_area(data: object) -> None | str | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(None | str | Unset, data)
+
+        area = _parse_area(d.pop("area", UNSET))
+
         new_run = cls(
             geometry=geometry,
             robot=robot,
+            area=area,
         )
 
         return new_run

@@ -29,6 +29,7 @@ class Run:
         num_observations (int): Observations so far.
         num_words (int): Words of all levels so far.
         robot (None | str | Unset): The robot.
+        area (None | str | Unset): Where it belongs, when the client said.
     """
 
     run: str
@@ -39,6 +40,7 @@ class Run:
     num_observations: int
     num_words: int
     robot: None | str | Unset = UNSET
+    area: None | str | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -62,6 +64,12 @@ class Run:
         else:
             robot = self.robot
 
+        area: None | str | Unset
+        if isinstance(self.area, Unset):
+            area = UNSET
+        else:
+            area = self.area
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -77,6 +85,8 @@ class Run:
         )
         if robot is not UNSET:
             field_dict["robot"] = robot
+        if area is not UNSET:
+            field_dict["area"] = area
 
         return field_dict
 
@@ -108,6 +118,15 @@ class Run:
 
         robot = _parse_robot(d.pop("robot", UNSET))
 
+        def _parse_area(data: object) -> None | str | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            return cast(None | str | Unset, data)
+
+        area = _parse_area(d.pop("area", UNSET))
+
         run = cls(
             run=run,
             geometry=geometry,
@@ -117,6 +136,7 @@ class Run:
             num_observations=num_observations,
             num_words=num_words,
             robot=robot,
+            area=area,
         )
 
         run.additional_properties = d
