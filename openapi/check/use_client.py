@@ -1,8 +1,8 @@
-"""Uses the generated Python client once against a filled server: python use_client.py URL."""
+"""Uses the generated Python client once against a filled server: python use_client.py URL KEY."""
 
 import sys
 
-from locution_api import Client
+from locution_api import AuthenticatedClient
 from locution_api.api.maps import get_grid_pgm, list_matches
 from locution_api.api.runs import list_scans
 from locution_api.api.sites import get_site, make_site
@@ -11,8 +11,8 @@ from locution_api.models import MatchPage, NewSite, Problem, Site, SiteSummary, 
 from locution_api.types import File
 
 
-def main(url: str) -> None:
-    client = Client(base_url=url)
+def main(url: str, key: str) -> None:
+    client = AuthenticatedClient(base_url=url, token=key)
     site = get_site.sync("office", client=client)
     assert isinstance(site, Site) and site.num_scans > 0, site
 
@@ -37,4 +37,4 @@ def main(url: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

@@ -11,7 +11,8 @@ fn main() -> anyhow::Result<()> {
         let checked_in = std::fs::read_to_string(&path).context("openapi.json has not been written")?;
         if checked_in != current {
             bail!(
-                "openapi.json is stale: run `cargo run --release -p locution-openapi` and look at the difference"
+                "openapi.json is stale: run `cargo build --workspace`, then `target/debug/locution-openapi`, and look \
+                 at the difference"
             );
         }
         return Ok(());

@@ -109,6 +109,13 @@ const ROUTES: &[(&str, &str, Option<Scope>)] = &[
     ("POST", "/v1/queries/labels", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/places", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/route", Some(Scope::Read)),
+    ("GET", "/v1/sites/{site}/rooms", Some(Scope::Read)),
+    ("GET", "/v1/sites/{site}/map/rooms.geojson", Some(Scope::Read)),
+    ("GET", "/v1/sites/{site}/annotations", Some(Scope::Read)),
+    ("POST", "/v1/sites/{site}/annotations", Some(Scope::Write)),
+    ("GET", "/v1/sites/{site}/annotations/{id}", Some(Scope::Read)),
+    ("PUT", "/v1/sites/{site}/annotations/{id}", Some(Scope::Write)),
+    ("DELETE", "/v1/sites/{site}/annotations/{id}", Some(Scope::Write)),
     ("GET", "/v1/sites/{site}/changes", Some(Scope::Read)),
     ("POST", "/v1/queries/example", Some(Scope::Read)),
 ];

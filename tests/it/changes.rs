@@ -1,12 +1,11 @@
 //! What changed between two sessions: a drawn office, driven twice, with a cabinet moved in between.
 
 use locution_engine::geometry::{Point2, Pose2};
-use locution_lab::simulation::{SimulationConfig, Task, World, simulate_run};
+use locution_lab::simulation::World;
 use locution_tests::{Api, TestServer};
 use serde_json::{Value, json};
 
-/// A rectangle of floor or of furniture: lower left and upper right corner, metres.
-type Block = (f64, f64, f64, f64);
+use crate::drawn::{Block, drawn_world, drive_route};
 
 /// A corridor round a block with rooms beside it that make every part of it its own.
 const FLOOR: [Block; 9] = [
@@ -35,47 +34,13 @@ const ROUTE: [(f64, f64); 9] = [
 ];
 
 fn office(cabinet: Block) -> World {
-    let (width, height, resolution_m) = (600, 400, 0.05);
-    let mut is_free = vec![false; width * height];
-    let mut draw = |(x0, y0, x1, y1): Block, value: bool| {
-        for y in (y0 / resolution_m) as usize..(y1 / resolution_m) as usize {
-            for x in (x0 / resolution_m) as usize..(x1 / resolution_m) as usize {
-                is_free[y * width + x] = value;
-            }
-        }
-    };
-    FLOOR.into_iter().for_each(|block| draw(block, true));
-    draw(cabinet, false);
-    World::new(width, height, resolution_m, Point2::new(0.0, 0.0), is_free).unwrap()
+    drawn_world((600, 400), &FLOOR, &[cabinet])
 }
 
 /// Drives a session and answers where it truly began.
 async fn post_session(api: &Api, run: &str, cabinet: Block, seed: u64) -> Pose2 {
-    let task = Task::Route(ROUTE.iter().map(|&(x, y)| Point2::new(x, y)).collect());
-    let simulated = simulate_run(&office(cabinet), &task, &SimulationConfig::default(), seed).unwrap();
-    let geometry = &simulated.geometry;
-    let pose = |pose: &Pose2| json!({"x": pose.x, "y": pose.y, "theta": pose.theta});
-    let made = json!({"geometry": {
-        "num_ranges": geometry.num_ranges,
-        "angle_min_rad": geometry.angle_min_rad,
-        "angle_increment_rad": geometry.angle_increment_rad,
-        "range_max_m": geometry.range_max_m,
-        "robot_from_laser": pose(&geometry.robot_from_laser),
-    }});
     api.put("/v1/sites/a", &json!({})).await.ok();
-    api.put(&format!("/v1/sites/a/runs/{run}"), &made).await.ok();
-    let reading = |&range_m: &f32| if geometry.is_return(range_m) { json!(range_m) } else { Value::Null };
-    let scan = |scan: &locution_engine::scan::Scan| {
-        json!({
-            "timestamp_ns": scan.timestamp_ns,
-            "odom_from_robot": pose(&scan.odom_from_robot),
-            "ranges_m": scan.ranges_m.iter().map(reading).collect::<Vec<_>>(),
-        })
-    };
-    let scans: Vec<Value> = simulated.scans.iter().map(scan).collect();
-    api.post_all("a", run, &scans, 200).await;
-    api.post(&format!("/v1/sites/a/runs/{run}/finish"), &json!({})).await.ok();
-    simulated.truth[0].truth_from_robot
+    drive_route(api, ("a", run), &office(cabinet), &ROUTE, seed).await
 }
 
 fn number(value: &Value, name: &str) -> f64 {
@@ -110,6 +75,11 @@ async fn a_cabinet_that_was_moved_is_listed_where_it_was_and_where_it_is() {
     let came = |change: &Value| is_at(change, "appeared", CABINET_AFTER, &world_from_map);
     assert!(changes.iter().any(went) && changes.iter().any(came), "{changes:?}");
     assert!(changes.iter().all(|change| went(change) || came(change)), "nothing else changed: {changes:?}");
+
+    for change in &changes {
+        assert_eq!(change["last_as_before"]["run"], "monday", "{change}");
+        assert_eq!(change["first_as_after"]["run"], "friday", "{change}");
+    }
 
     // Asked the other way round, what went has come.
     let backwards = api.all("/v1/sites/a/changes?before=friday&after=monday").await;

@@ -24,6 +24,7 @@
 
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
+mod annotations;
 mod client;
 mod error;
 mod events;

@@ -3,7 +3,7 @@
 use crate::client::Client;
 use crate::error::ClientError;
 use crate::routes::{self, Query, Route};
-use crate::types::{self, Change, Grid, Label, Map, Place, Point};
+use crate::types::{self, Change, Grid, Label, Map, Place, Point, Room};
 
 /// Which version of the map, and which part of it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -15,7 +15,7 @@ pub struct MapAt {
 }
 
 impl MapAt {
-    fn query(&self) -> Query {
+    pub(crate) fn query(&self) -> Query {
         Query::default().and("version", self.version).and("component", self.component)
     }
 }
@@ -37,6 +37,8 @@ pub enum MapForm {
     PicturePng,
     /// The same as vectors.
     PictureSvg,
+    /// Rooms, doors and annotations as a GeoJSON feature collection.
+    RoomsGeoJson,
 }
 
 impl MapForm {
@@ -49,6 +51,7 @@ impl MapForm {
             Self::TrajectoryTum => &routes::GET_MAP_TUM,
             Self::PicturePng => &routes::GET_PICTURE_PNG,
             Self::PictureSvg => &routes::GET_PICTURE_SVG,
+            Self::RoomsGeoJson => &routes::GET_ROOMS_GEOJSON,
         }
     }
 }
@@ -92,6 +95,14 @@ impl Client {
     /// See [`ClientError`].
     pub async fn places(&self, site: &str, at: MapAt) -> Result<Vec<Place>, ClientError> {
         self.all(&routes::LIST_PLACES, &[site], at.query()).await
+    }
+
+    /// Rooms and the doors between them; of all components unless one is said.
+    ///
+    /// # Errors
+    /// See [`ClientError`]; 409 before the first build.
+    pub async fn rooms(&self, site: &str, at: MapAt) -> Result<Vec<Room>, ClientError> {
+        self.all(&routes::LIST_ROOMS, &[site], at.query()).await
     }
 
     /// The shortest way over driven ground.

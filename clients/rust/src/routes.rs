@@ -124,6 +124,13 @@ routes! {
     LIST_LABELS "list_labels" GET "/v1/sites/{site}/labels";
     LIST_PLACES "list_places" GET "/v1/sites/{site}/places";
     GET_ROUTE "get_route" GET "/v1/sites/{site}/route";
+    LIST_ROOMS "list_rooms" GET "/v1/sites/{site}/rooms";
+    GET_ROOMS_GEOJSON "get_rooms_geojson" GET "/v1/sites/{site}/map/rooms.geojson";
+    LIST_ANNOTATIONS "list_annotations" GET "/v1/sites/{site}/annotations";
+    MAKE_ANNOTATION "make_annotation" POST "/v1/sites/{site}/annotations";
+    GET_ANNOTATION "get_annotation" GET "/v1/sites/{site}/annotations/{id}";
+    CHANGE_ANNOTATION "change_annotation" PUT "/v1/sites/{site}/annotations/{id}";
+    DELETE_ANNOTATION "delete_annotation" DELETE "/v1/sites/{site}/annotations/{id}";
     LIST_CHANGES "list_changes" GET "/v1/sites/{site}/changes";
     GET_HEALTH "get_health" GET "/healthz";
     GET_READINESS "get_readiness" GET "/readyz";

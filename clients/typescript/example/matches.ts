@@ -1,9 +1,9 @@
-// Matches of a site, by `node dist/example/matches.js http://127.0.0.1:7070 office`.
+// Matches of a site, by `node dist/example/matches.js http://127.0.0.1:7070 office [KEY]`.
 
 import { Client, Refused } from "../src/index.js";
 
-const [url = "http://127.0.0.1:7070", site = "office"] = process.argv.slice(2);
-const client = new Client(url);
+const [url = "http://127.0.0.1:7070", site = "office", apiKey] = process.argv.slice(2);
+const client = new Client(url, apiKey ? { apiKey } : {});
 
 const about = await client.get("/v1/sites/{site}", { path: { site } });
 console.log(`${about.site}: ${about.num_runs} runs, ${about.num_words} words`);

@@ -212,6 +212,43 @@ export interface paths {
         patch: operations["change_site"];
         trace?: never;
     };
+    "/v1/sites/{site}/annotations": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Annotations where they lie in the serving map, or in a version, in the order of their making. */
+        get: operations["list_annotations"];
+        put?: never;
+        /** Draw something into the map. It is tied to the places around it and moves with them in every version to come. */
+        post: operations["make_annotation"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/annotations/{id}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One annotation. */
+        get: operations["get_annotation"];
+        /** Draw something else in its place; everything of it is as the body says. */
+        put: operations["change_annotation"];
+        post?: never;
+        /** Forget an annotation. */
+        delete: operations["delete_annotation"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/backup": {
         parameters: {
             query?: never;
@@ -533,6 +570,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/map/rooms.geojson": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Rooms, doors and annotations as a GeoJSON feature collection, in metres under the frame of each component. */
+        get: operations["get_rooms_geojson"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/map/trajectory.tum": {
         parameters: {
             query?: never;
@@ -670,6 +724,23 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/rooms": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Rooms, corridors and halls with the doors between them, in the order of components and ids. Ids and names survive rebuilds. */
+        get: operations["list_rooms"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/route": {
         parameters: {
             query?: never;
@@ -677,7 +748,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The shortest way over driven ground, told place by place. */
+        /** The shortest way over driven ground, told place by place and door by door. */
         get: operations["get_route"];
         put?: never;
         post?: never;
@@ -853,6 +924,31 @@ export interface paths {
 export type webhooks = Record<string, never>;
 export interface components {
     schemas: {
+        /** @description Something that a person drew, where it lies in a version of the map. */
+        Annotation: {
+            /**
+             * @description Its id, the same in every version.
+             * @example 7
+             */
+            id: string;
+            /** @description What sort of thing it is. */
+            kind: string;
+            /** @description What people call it. */
+            name: string;
+            /**
+             * Format: int64
+             * @description Component of the map in whose frame the geometry is; null in a version without the runs that drove there.
+             */
+            component?: number | null;
+            geometry?: components["schemas"]["Shape"] | null;
+        };
+        /** @description Part of a list. */
+        AnnotationPage: {
+            /** @description In order. */
+            items: components["schemas"]["Annotation"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
+        };
         /** @description Scans to append to a run. */
         Batch: {
             /**
@@ -894,6 +990,8 @@ export interface components {
              * @description How clearly the scans and densities of both sessions tell, from 0 to 1.
              */
             confidence: number;
+            last_as_before?: components["schemas"]["ChangeVisit"] | null;
+            first_as_after?: components["schemas"]["ChangeVisit"] | null;
         };
         /**
          * @description What became of something that stood or stands there.
@@ -907,6 +1005,16 @@ export interface components {
             /** @description Where the next page begins; null at the end. */
             next_cursor?: string | null;
         };
+        /** @description A visit that saw a changed area. */
+        ChangeVisit: {
+            /** @description The run. */
+            run: string;
+            /**
+             * Format: int64
+             * @description When the visit ended, if it saw the area as it was; when it began, if it saw it as it is.
+             */
+            timestamp_ns: number;
+        };
         /** @description A site after it was changed. */
         ChangedSite: {
             /** @description The site. */
@@ -918,6 +1026,11 @@ export interface components {
          * @enum {string}
          */
         Channel: "words" | "profile" | "spatial";
+        /**
+         * @description `FeatureCollection`, as GeoJSON calls it.
+         * @enum {string}
+         */
+        CollectionType: "FeatureCollection";
         /** @description A part of the map with a frame of its own. */
         Component: {
             /**
@@ -957,6 +1070,18 @@ export interface components {
          * @enum {string}
          */
         Direction: "same" | "opposite";
+        /** @description A door of a room. */
+        Door: {
+            /** @description Its middle. */
+            position: components["schemas"]["Point"];
+            /**
+             * Format: double
+             * @description Diameter of the largest disc that passes through it, metres.
+             */
+            width_m: number;
+            /** @description Ids of the rooms that it joins. */
+            rooms: number[];
+        };
         /** @description Something that happened in a site. */
         Event: {
             /** @description Its name. */
@@ -1152,6 +1277,60 @@ export interface components {
             /** @description In order of driving; some metres of it. */
             scans: components["schemas"]["Scan"][];
         };
+        /** @description A thing on the map. */
+        Feature: {
+            /** @description `Feature`. */
+            type: components["schemas"]["FeatureType"];
+            /** @description Where it is. */
+            geometry: components["schemas"]["Shape"];
+            /** @description What it is. */
+            properties: components["schemas"]["FeatureProperties"];
+        };
+        /** @description The rooms, doors and annotations of a map as GeoJSON. */
+        FeatureCollection: {
+            /** @description `FeatureCollection`. */
+            type: components["schemas"]["CollectionType"];
+            /** @description Rooms, then doors, then annotations, component after component. */
+            features: components["schemas"]["Feature"][];
+        };
+        /**
+         * @description What a feature of a map is.
+         * @enum {string}
+         */
+        FeatureKind: "room" | "door" | "annotation";
+        /** @description What is said of a feature; null is what does not apply to it. */
+        FeatureProperties: {
+            /** @description What it is. */
+            feature: components["schemas"]["FeatureKind"];
+            /**
+             * Format: int64
+             * @description Component of the map in whose frame it is.
+             */
+            component: number;
+            /** @description Id of the room or of the annotation. */
+            id?: string | null;
+            /** @description Of a room `room`, `corridor` or `hall`; of an annotation its kind. */
+            label?: string | null;
+            /** @description What people call it. */
+            name?: string | null;
+            /**
+             * Format: double
+             * @description Of a room, square metres.
+             */
+            area_m2?: number | null;
+            /**
+             * Format: double
+             * @description Of a door, metres.
+             */
+            width_m?: number | null;
+            /** @description Ids of the rooms beside a room, or joined by a door. */
+            rooms: number[];
+        };
+        /**
+         * @description `Feature`, as GeoJSON calls it.
+         * @enum {string}
+         */
+        FeatureType: "Feature";
         /** @description What all scans of a run share. */
         Geometry: {
             /**
@@ -1633,6 +1812,26 @@ export interface components {
          * @enum {string}
          */
         Missing: "travel" | "elsewhere" | "alternatives" | "persistence" | "recent_scans" | "position";
+        /** @description What to draw. */
+        NewAnnotation: {
+            /**
+             * @description What sort of thing it is, in words of your own; `room` names the room in which it lies.
+             * @example dock
+             */
+            kind: string;
+            /**
+             * @description What people call it.
+             * @example Charging station
+             */
+            name: string;
+            /**
+             * Format: int64
+             * @description Component of the map in whose frame the geometry is; the first unless said.
+             */
+            component?: number;
+            /** @description Where it is, in metres; at most 1000 positions. */
+            geometry: components["schemas"]["Shape"];
+        };
         /** @description Makes a key. */
         NewKey: {
             /**
@@ -1962,6 +2161,48 @@ export interface components {
              */
             num_scans?: number | null;
         };
+        /** @description A part of the floor with walls and doors around it. */
+        Room: {
+            /**
+             * Format: int64
+             * @description Its id, the same in every version that holds the room.
+             */
+            id: number;
+            /** @description What it is by its shape. */
+            label: components["schemas"]["RoomLabel"];
+            /** @description What people call it: the name of the annotation of kind `room` that lies in it. */
+            name?: string | null;
+            /**
+             * Format: int64
+             * @description Component of the map in whose frame the positions are.
+             */
+            component: number;
+            /**
+             * Format: double
+             * @description Free floor in it, square metres.
+             */
+            area_m2: number;
+            /** @description The position in it that is farthest from any wall. */
+            centre: components["schemas"]["Point"];
+            /** @description Its floor, a polygon. */
+            geometry: components["schemas"]["Shape"];
+            /** @description Ids of the rooms that a door joins it to. */
+            neighbours: number[];
+            /** @description Its doors. */
+            doors: components["schemas"]["Door"][];
+        };
+        /**
+         * @description What a room is by its shape.
+         * @enum {string}
+         */
+        RoomLabel: "room" | "corridor" | "hall";
+        /** @description Part of a list. */
+        RoomPage: {
+            /** @description In order. */
+            items: components["schemas"]["Room"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
+        };
         /** @description A way from one position to another. */
         Route: {
             /**
@@ -1992,6 +2233,12 @@ export interface components {
             length_m: number;
             /** @description How it is left. */
             turn: components["schemas"]["RouteTurn"];
+            /**
+             * Format: int64
+             * @description Id of the room in which it lies; null where no room is known.
+             */
+            room?: number | null;
+            door?: components["schemas"]["Point"] | null;
             /** @description What a person would say. */
             text: string;
         };
@@ -2070,6 +2317,23 @@ export interface components {
             angular_velocity_rad_per_s?: number | null;
             /** @description Readings in metres, in the order of the geometry's beams. */
             ranges_m: components["schemas"]["Ranges"];
+        };
+        /** @description A shape in metres. */
+        Shape: {
+            /** @description x and y. */
+            coordinates: number[];
+            /** @enum {string} */
+            type: "Point";
+        } | {
+            /** @description x and y of each; at least two. */
+            coordinates: number[][];
+            /** @enum {string} */
+            type: "LineString";
+        } | {
+            /** @description The outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first. */
+            coordinates: number[][][];
+            /** @enum {string} */
+            type: "Polygon";
         };
         /** @description A site, how it is configured and what it holds. */
         Site: {
@@ -3044,6 +3308,237 @@ export interface operations {
             408: components["responses"]["RequestTimeout"];
             413: components["responses"]["PayloadTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    list_annotations: {
+        parameters: {
+            query?: {
+                /** @description Only of this kind. */
+                kind?: string;
+                /** @description Only in this component. */
+                component?: number;
+                /** @description Version of the map in which they are to be placed; the serving one unless said. */
+                version?: number;
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of annotations */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AnnotationPage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    make_annotation: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewAnnotation"];
+            };
+        };
+        responses: {
+            /** @description It is kept */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Annotation"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    get_annotation: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Its name, chosen by the server */
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The annotation */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Annotation"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    change_annotation: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Its name, chosen by the server */
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["NewAnnotation"];
+            };
+        };
+        responses: {
+            /** @description The annotation as it is now */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["Annotation"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    delete_annotation: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Its name, chosen by the server */
+                id: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is gone */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
             422: components["responses"]["UnprocessableContent"];
             429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];
@@ -4068,6 +4563,59 @@ export interface operations {
             503: components["responses"]["ServiceUnavailable"];
         };
     };
+    get_rooms_geojson: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+                /** @description The component; for grids the first unless said, elsewhere all. */
+                component?: number;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The features */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/geo+json": components["schemas"]["FeatureCollection"];
+                };
+            };
+            /** @description The client has this */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
     get_map_tum: {
         parameters: {
             query?: {
@@ -4515,6 +5063,56 @@ export interface operations {
             408: components["responses"]["RequestTimeout"];
             413: components["responses"]["PayloadTooLarge"];
             415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    list_rooms: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+                /** @description The component; for grids the first unless said, elsewhere all. */
+                component?: number;
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of rooms */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RoomPage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
             422: components["responses"]["UnprocessableContent"];
             429: components["responses"]["TooManyRequests"];
             500: components["responses"]["InternalServerError"];

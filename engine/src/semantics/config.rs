@@ -4,6 +4,7 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
+use super::rooms::RoomsConfig;
 use crate::config_error::ConfigError;
 
 /// How places are labelled from the map.
@@ -70,6 +71,8 @@ pub struct SemanticsConfig {
     pub place_cell_m: f64,
     /// A place has at least this many cells; smaller ones go over to a neighbour.
     pub place_cells_min: usize,
+    /// How the floor is divided into rooms.
+    pub rooms: RoomsConfig,
 }
 
 impl Default for SemanticsConfig {
@@ -103,6 +106,7 @@ impl Default for SemanticsConfig {
             smoothing_m: 1.6,
             place_cell_m: 0.5,
             place_cells_min: 3,
+            rooms: RoomsConfig::default(),
         }
     }
 }
@@ -158,6 +162,6 @@ impl SemanticsConfig {
                 ));
             }
         }
-        Ok(())
+        self.rooms.validate(&format!("{path}.rooms"))
     }
 }

@@ -9,8 +9,10 @@
 //!                                    routes, stretches of one label ◄─ places of the map ◄─┘
 //! ```
 //! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it, and [`MapLabels`] does both
-//! for every component of a map. [`find_rooms`] needs no run: it divides a served grid into rooms and doors.
+//! for every component of a map. [`find_rooms`] needs no run: it divides a served grid into rooms and doors, which
+//! [`MapRooms`] numbers through all versions of a map. [`Anchor`]s tie what a person draws to the keyframes around it.
 
+mod anchors;
 mod block;
 mod config;
 mod decision_tree;
@@ -19,6 +21,7 @@ mod label;
 mod label_map;
 mod map_labels;
 mod outline;
+mod passages;
 mod places;
 mod rooms;
 mod route;
@@ -29,13 +32,18 @@ mod stretches;
 #[cfg(test)]
 mod tests;
 
+pub use anchors::{Anchor, MovedPose, anchors_near, carry_point};
 pub use config::SemanticsConfig;
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};
 pub use label::PlaceLabel;
 pub use label_map::{DrivenRun, LabeledRun, label_runs};
 pub use map_labels::MapLabels;
+pub use passages::NamedRooms;
 pub use places::{Place, PlaceMap, Spot, Visit};
-pub use rooms::{Door, Room, RoomKind, RoomMap, RoomsConfig, find_rooms};
+pub use rooms::{
+    ComponentRooms, Door, KnownDoor, KnownRoom, MapRooms, Room, RoomKind, RoomMap, RoomsBefore, RoomsConfig,
+    find_rooms,
+};
 pub use route::{Route, RouteStep, Turn, route};
 pub use rules::label_of;
 pub use segmentation::{Segment, SegmentationConfig, segments};

@@ -6,6 +6,7 @@ use std::collections::BinaryHeap;
 use serde::{Deserialize, Serialize};
 
 use super::label::PlaceLabel;
+use super::passages::{NamedRooms, Passages};
 use super::places::PlaceMap;
 use crate::geometry::{Point2, wrap_angle};
 
@@ -53,6 +54,10 @@ pub struct RouteStep {
     pub length_m: f64,
     /// How it is left.
     pub turn: Turn,
+    /// Id of the room in which it lies, where rooms are known.
+    pub room: Option<u64>,
+    /// Middle of the door through which the room is left at the end of the step.
+    pub door: Option<Point2>,
     /// What a person would say.
     pub text: String,
 }
@@ -71,8 +76,14 @@ pub struct Route {
 }
 
 /// The shortest way over driven ground between the spots nearest to two positions (Dijkstra); `None` when no way
-/// is known or a position is farther than `reach_m` from any driven ground.
-pub fn route(map: &PlaceMap, from: &Point2, to: &Point2, reach_m: f64) -> Option<Route> {
+/// is known or a position is farther than `reach_m` from any driven ground. A step ends where a place or a room ends.
+pub fn route(
+    map: &PlaceMap,
+    rooms: &NamedRooms<'_>,
+    from: &Point2,
+    to: &Point2,
+    reach_m: f64,
+) -> Option<Route> {
     let start = nearest(map, from, reach_m)?;
     let goal = nearest(map, to, reach_m)?;
     let path = shortest_path(map, start, goal)?;
@@ -81,11 +92,14 @@ pub fn route(map: &PlaceMap, from: &Point2, to: &Point2, reach_m: f64) -> Option
     for pair in points.windows(2) {
         travel_m.push(travel_m[travel_m.len() - 1] + pair[0].distance(&pair[1]));
     }
-    let mut steps = Vec::new();
+    let passages = Passages::on_way(rooms, &points, &travel_m);
+    let place_of = |idx: usize| map.spots[path[idx]].place;
+    let mut steps: Vec<RouteStep> = Vec::new();
     let mut first = 0;
     for last in 0..path.len() {
-        let place = map.spots[path[first]].place;
-        if path.get(last + 1).is_some_and(|&next| map.spots[next].place == place) {
+        let place = place_of(first);
+        let door = passages.door_after(last);
+        if last + 1 < path.len() && place_of(last + 1) == place && door.is_none() {
             continue;
         }
         let label = map.places[place as usize].label;
@@ -95,8 +109,17 @@ pub fn route(map: &PlaceMap, from: &Point2, to: &Point2, reach_m: f64) -> Option
         let turn = Turn::of(turn_between(&points, &travel_m, first, last));
         let length_m = end_m - begin_m;
         let is_end = last + 1 == path.len();
-        let text = phrase(label, length_m, turn, first == 0, is_end);
-        steps.push(RouteStep { place, label, length_m, turn, text });
+        let is_entered = steps.last().is_some_and(|step| step.door.is_some());
+        let room = passages.room_at(last);
+        let mut text = match room.filter(|_| is_end && is_entered) {
+            Some(room) => format!("{} m into {}", length_m.round().max(1.0), rooms.name_of(room)),
+            None => phrase(label, length_m, turn, first == 0, is_end),
+        };
+        if let Some(door) = door {
+            text = format!("{text}, {}", door.text);
+        }
+        let door = door.map(|door| door.position);
+        steps.push(RouteStep { place, label, length_m, turn, room, door, text });
         first = last + 1;
     }
     let description = steps.iter().map(|step| step.text.as_str()).collect::<Vec<_>>().join(", ");

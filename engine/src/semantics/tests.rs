@@ -124,14 +124,15 @@ fn a_visited_room_is_a_dead_end_and_a_large_one_on_the_way_a_hall() {
 fn a_route_is_told_in_words_both_ways() {
     let angle = angle();
     let (west, north) = (Point2::new(8.0, 1.0), Point2::new(21.0, 14.0));
-    let there = route(&angle.map, &west, &north, 2.0).expect("both lie on the way driven");
+    let there =
+        route(&angle.map, &NamedRooms::default(), &west, &north, 2.0).expect("both lie on the way driven");
     assert!((there.length_m - 26.0).abs() < 1.5, "{} m", there.length_m);
     let labels: Vec<PlaceLabel> = there.steps.iter().map(|step| step.label).collect();
     assert_eq!(labels, [PlaceLabel::Corridor, PlaceLabel::Corner, PlaceLabel::Corridor]);
     assert!(there.description.contains("left at the corner"), "{}", there.description);
-    let back = route(&angle.map, &north, &west, 2.0).expect("ways lead back");
+    let back = route(&angle.map, &NamedRooms::default(), &north, &west, 2.0).expect("ways lead back");
     assert!(back.description.contains("right at the corner"), "{}", back.description);
-    assert_eq!(route(&angle.map, &west, &Point2::new(8.0, 9.0), 2.0), None);
+    assert_eq!(route(&angle.map, &NamedRooms::default(), &west, &Point2::new(8.0, 9.0), 2.0), None);
 }
 
 #[test]

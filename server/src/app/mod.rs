@@ -5,7 +5,7 @@
 //! backups a site as a stream, and a site made of one
 //! runs    a batch ─► the run's one writer ─► translator ─► one commit ─► receipt;  trajectories
 //! jobs    in the background: maps are built, texts written anew
-//! maps    versions written and served: regions, matches, labels, places, changes, grids, pictures
+//! maps    versions written and served: regions, rooms, matches, labels, places, changes, grids, pictures; annotations
 //! ask     by words, by a short recording, by a robot that drives
 //!   └─ all on ─► site   the record and how it changes; the parts that a process keeps of a site
 //! ```

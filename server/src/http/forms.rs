@@ -66,7 +66,21 @@ impl MapAt {
         content_type: &'static str,
         body: impl Future<Output = Result<Vec<u8>, ApiError>>,
     ) -> Result<Response, ApiError> {
-        let tag = self.tag();
+        self.answer_as(self.tag(), content_type, body).await
+    }
+
+    /// The tag of a form that also shows what changes without a new version, by a number that counts those changes.
+    pub(super) fn tag_with(&self, num_changes: u64) -> String {
+        format!("{}-{num_changes}\"", self.tag().trim_end_matches('"'))
+    }
+
+    /// A form of the map with a tag of its own.
+    pub(super) async fn answer_as(
+        &self,
+        tag: String,
+        content_type: &'static str,
+        body: impl Future<Output = Result<Vec<u8>, ApiError>>,
+    ) -> Result<Response, ApiError> {
         if is_known(&self.headers, &tag) {
             return Ok((StatusCode::NOT_MODIFIED, [(header::ETAG, tag)]).into_response());
         }

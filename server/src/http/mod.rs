@@ -7,9 +7,10 @@
 //! ```
 //!
 //! `resources` holds a file per resource: its parameters, its bodies, its handlers. `forms` holds the map in the
-//! formats of other tools, `page` the files of the page under `/ui`.
+//! formats of other tools, `geojson` shapes as GeoJSON writes them, `page` the files of the page under `/ui`.
 
 mod forms;
+mod geojson;
 pub(crate) mod nanoseconds;
 pub mod openapi;
 pub(crate) mod page;

@@ -4,8 +4,8 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::resources::{
-    backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches, operations, places,
-    runs, sites, texts, word_queries,
+    annotations, backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches,
+    operations, places, rooms, runs, sites, texts, word_queries,
 };
 use super::{forms, page};
 use crate::auth::{Rule, Ruled};
@@ -69,6 +69,12 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(READ, routes!(labels::query_labels_everywhere))
         .ruled(READ, routes!(places::list_places))
         .ruled(READ, routes!(places::get_route))
+        .ruled(READ, routes!(rooms::list_rooms))
+        .ruled(READ, routes!(rooms::get_rooms_geojson))
+        .ruled(READ, routes!(annotations::list_annotations))
+        .ruled(READ, routes!(annotations::get_annotation))
+        .ruled(WRITE, routes!(annotations::make_annotation))
+        .ruled(WRITE, routes!(annotations::change_annotation_of, annotations::delete_annotation_of))
         .ruled(READ, routes!(changes::list_changes))
         .ruled(READ.with_scans(), routes!(localizations::query_example_everywhere))
 }

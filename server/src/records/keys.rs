@@ -23,6 +23,8 @@ pub enum PartKind {
     Places = 3,
     /// Where and when the stretches of matches were driven, in the order of the matches.
     MatchPlaces = 4,
+    /// Rooms of all components, in pieces.
+    Rooms = 5,
 }
 
 /// Names a stored value of a site.
@@ -63,6 +65,8 @@ pub enum Key {
     Job(u64),
     /// Registrations of a build that the end of the server interrupted, in parts of less than one mebibyte.
     Registrations(u32),
+    /// What a person drew into the map.
+    Annotation(u64),
 }
 
 impl Key {
@@ -99,6 +103,7 @@ impl Key {
             Key::Decision(number) => Writer::new(0x30).u64(*number).done(),
             Key::Job(number) => Writer::new(0x31).u64(*number).done(),
             Key::Registrations(part) => Writer::new(0x32).u32(*part).done(),
+            Key::Annotation(number) => Writer::new(0x33).u64(*number).done(),
         }
     }
 
@@ -197,6 +202,11 @@ impl Key {
         vec![0x32]
     }
 
+    /// The prefix of all annotations.
+    pub fn all_annotations() -> Vec<u8> {
+        vec![0x33]
+    }
+
     /// The big-endian number that closes a key, such as the first sequence number of a chunk.
     pub fn last_u64(key: &[u8]) -> Option<u64> {
         key.last_chunk().map(|bytes| u64::from_be_bytes(*bytes))
@@ -248,7 +258,8 @@ mod tests {
             Just(PartKind::Poses),
             Just(PartKind::Labels),
             Just(PartKind::Places),
-            Just(PartKind::MatchPlaces)
+            Just(PartKind::MatchPlaces),
+            Just(PartKind::Rooms)
         ]
     }
 
@@ -271,6 +282,7 @@ mod tests {
             any::<u64>().prop_map(Key::Decision),
             any::<u64>().prop_map(Key::Job),
             any::<u32>().prop_map(Key::Registrations),
+            any::<u64>().prop_map(Key::Annotation),
         ]
     }
 

@@ -5,7 +5,7 @@ use std::ops::Range;
 use locution_engine::mapping::PlaceMatch;
 use locution_engine::recording::{PlacedKeyframe, RunTrajectory};
 use locution_engine::scan::Scan;
-use locution_engine::semantics::PlaceMap;
+use locution_engine::semantics::{MapRooms, PlaceMap};
 
 use super::codec;
 use super::keys::{Key, PartKind};
@@ -116,6 +116,17 @@ impl Map {
         serde_json::from_slice(&json).map(Some).map_err(|error| unreadable("places", &error))
     }
 
+    /// The rooms of all components; `None` in versions of programs that did not know rooms.
+    pub async fn rooms(&self) -> Result<Option<MapRooms>, StorageError> {
+        let prefix = Key::all_map_parts(self.record.version, PartKind::Rooms);
+        let stored = self.reader.store().scan(&prefix, &[], usize::MAX).await?;
+        if stored.is_empty() {
+            return Ok(None);
+        }
+        let json = join_pieces(stored.iter().map(|(_, piece)| piece), "rooms")?;
+        serde_json::from_slice(&json).map(Some).map_err(|error| unreadable("rooms", &error))
+    }
+
     /// Calls `visit(number, match)` for every match from a number on, until it answers that it has enough.
     pub async fn visit_matches(
         &self,
@@ -208,6 +219,17 @@ pub fn append_places(
 ) -> serde_json::Result<()> {
     for (piece, bytes) in (0..).zip(pieces(&serde_json::to_vec(places)?)) {
         batch.put(Key::places(version, component, piece).encode(), bytes);
+    }
+    Ok(())
+}
+
+/// Writes the rooms of a version into a batch, as JSON in pieces.
+///
+/// # Errors
+/// What the encoder says of rooms that cannot be written.
+pub fn append_rooms(batch: &mut Batch, version: u64, rooms: &MapRooms) -> serde_json::Result<()> {
+    for (piece, bytes) in (0..).zip(pieces(&serde_json::to_vec(rooms)?)) {
+        batch.put(Key::MapPart(version, PartKind::Rooms, piece).encode(), bytes);
     }
     Ok(())
 }

@@ -3,10 +3,10 @@
 //!
 //! ```text
 //! app ─► SiteReader: one store, one text generation ─► Run: observations · words · keyframes · scans
-//!                                                   └► Map: poses · labels · places · matches
+//!                                                   └► Map: poses · labels · places · rooms · matches
 //!
 //! keys                       where a value stands, in the order in which it is read
-//! stored, stored_map         plain values
+//! stored, stored_map, annotation   plain values
 //! series, scans, pieces      values that are cut into chunks
 //! codec, packed_ranges       their bytes, with version and checksum
 //! ```
@@ -14,6 +14,7 @@
 //! A reader is made once for a question: whoever asks for a run and then for its words gets both from one generation,
 //! also when another begins to serve between the two.
 
+mod annotation;
 pub mod codec;
 mod deletion;
 mod keys;
@@ -27,9 +28,10 @@ pub mod series;
 mod stored;
 mod stored_map;
 
+pub use annotation::{Annotation, Shape};
 pub use deletion::delete_prefixes;
 pub use keys::{Generation, Key, MapVersion, PartKind, RunIdx};
-pub use map::{Map, PlacedRun, Visit, append_places, match_chunks};
+pub use map::{Map, PlacedRun, Visit, append_places, append_rooms, match_chunks};
 pub use pieces::{join_pieces, pieces};
 pub use reader::SiteReader;
 pub use run::Run;

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use locution_engine::mapping::Decision;
 use serde::de::DeserializeOwned;
 
+use super::annotation::Annotation;
 use super::codec;
 use super::keys::{Generation, Key, MapVersion, RunIdx};
 use super::map::Map;
@@ -76,6 +77,23 @@ impl SiteReader {
             Ok((number, codec::decode(bytes, "a decision")?))
         });
         decisions.collect()
+    }
+
+    /// What people drew, with its numbers, ascending.
+    pub async fn annotations(&self) -> Result<Vec<(u64, Annotation)>, StorageError> {
+        let entries = self.store.scan(&Key::all_annotations(), &[], usize::MAX).await?;
+        let annotations = entries.iter().map(|(key, bytes)| {
+            let number = Key::last_u64(key)
+                .ok_or_else(|| StorageError::Corrupt { what: "the key of an annotation".into() })?;
+            Ok((number, Annotation::decode(bytes)?))
+        });
+        annotations.collect()
+    }
+
+    /// One of them; `None` when there is none of this number.
+    pub async fn annotation(&self, number: u64) -> Result<Option<Annotation>, StorageError> {
+        let bytes = self.store.get(&Key::Annotation(number).encode()).await?;
+        bytes.map(|bytes| Annotation::decode(&bytes)).transpose()
     }
 }
 

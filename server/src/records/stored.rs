@@ -27,7 +27,7 @@ pub struct SiteRecord {
     pub map_version: MapVersion,
     /// The number of the next job.
     pub next_job: u64,
-    /// The number of the next decision.
+    /// The number of the next thing that a person says: a decision, or an annotation that is made, changed or deleted.
     pub next_decision: u64,
     /// Drawn at random when the site was made: a site that is deleted and made again under the same name is another
     /// one, and nothing that was kept of the first may be served for the second.

@@ -2,8 +2,8 @@
 //!
 //! `cargo run --release --example map_worlds -- fleet ipa-lab-a 4` lets four robots wander from unknown starts through
 //! one world. `… changes ipa-lab-a` lets one robot wander through the world and another through its twin with
-//! furniture, and judges the list of changes by the difference of the two pictures. `LOCUTION_DATASETS` says where the
-//! worlds are.
+//! furniture, and judges the list of changes by the difference of the two pictures; a third word may be settings of the
+//! comparison as JSON. `LOCUTION_DATASETS` says where the worlds are.
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
@@ -28,8 +28,13 @@ fn main() -> Result<(), Failure> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
         ["fleet", world, num_robots] => fleet(world, num_robots.parse()?),
-        ["changes", world] => changes(world),
-        _ => Err("say `fleet WORLD ROBOTS` or `changes WORLD`".into()),
+        ["changes", world] => changes(world, &[ChangesConfig::default()]),
+        ["changes", world, settings @ ..] => {
+            let parsed: Result<Vec<ChangesConfig>, _> =
+                settings.iter().map(|json| serde_json::from_str(json)).collect();
+            changes(world, &parsed?)
+        }
+        _ => Err("say `fleet WORLD ROBOTS` or `changes WORLD [SETTINGS]`".into()),
     }
 }
 
@@ -43,7 +48,7 @@ fn fleet(name: &str, num_robots: u64) -> Result<(), Failure> {
     Ok(())
 }
 
-fn changes(name: &str) -> Result<(), Failure> {
+fn changes(name: &str, settings: &[ChangesConfig]) -> Result<(), Failure> {
     let worlds = [read_world(name)?, read_world(&format!("{name}-furniture"))?];
     // Long drives, so that most of what changed is seen.
     let runs = [Driven::new(&worlds[0], 2.0 * LENGTH_M, 7)?, Driven::new(&worlds[1], 2.0 * LENGTH_M, 8)?];
@@ -70,8 +75,10 @@ fn changes(name: &str) -> Result<(), Failure> {
         map_from_keyframes: &map.runs[index].map_from_keyframes,
         densities: &densities[index],
     };
-    let found = find_changes(&[placed(0)], &[placed(1)], &ChangesConfig::default())?;
-    judge_changes(&worlds, &runs, &world_from_map(&runs[0], &map, 0), &found);
+    for config in settings {
+        let found = find_changes(&[placed(0)], &[placed(1)], config)?;
+        judge_changes(&worlds, &runs, &world_from_map(&runs[0], &map, 0), &found);
+    }
     Ok(())
 }
 
@@ -204,11 +211,15 @@ const JOIN_M: f64 = 0.35;
 /// A thing counts when both drives came this near with nothing in between, metres.
 const SEEN_M: f64 = 5.0;
 
-/// Precision: listed changes that are where the pictures differ. Recall: things that differ, were there to be seen in
-/// both drives, and have a listed change.
+/// Smaller things need not be found, m².
+const THING_MIN_M2: f64 = 0.1;
+
+/// Precision: listed changes that are where the pictures differ, if only by the leg of a chair. Recall: things that differ,
+/// are large enough, were there to be seen in both drives, and have a listed change.
 fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2, found: &[Change]) {
-    let things = things(worlds);
-    let cells: BTreeSet<Cell> = things.iter().flatten().copied().collect();
+    let cells = differing_cells(worlds);
+    let mut things = things(&cells);
+    things.retain(|thing| thing_m2(worlds, thing) >= THING_MIN_M2);
     let centers: Vec<Point2> =
         found.iter().map(|change| world_from_map.transform_point(&change.center)).collect();
     let boxes: Vec<f64> = found.iter().map(|change| 0.5 * change.low.distance(&change.high)).collect();
@@ -233,8 +244,8 @@ fn judge_changes(worlds: &[World; 2], runs: &[Driven; 2], world_from_map: &Pose2
     };
     let num_found = seen.iter().filter(|thing| is_listed(thing)).count();
     println!(
-        "{} changes listed, {num_right} right: precision {:.3} ({:.3} of the surface); {} things differ, {} were there \
-         to be seen, {num_found} found: recall {:.3}",
+        "{} changes listed, {num_right} right: precision {:.3} ({:.3} of the surface); {} things of {THING_MIN_M2} m² \
+         differ, {} were there to be seen, {num_found} found: recall {:.3}",
         found.len(),
         num_right as f64 / found.len().max(1) as f64,
         right_m2 / all_m2.max(1e-9),
@@ -252,18 +263,40 @@ fn point_of((x, y): Cell) -> Point2 {
     Point2::new((x as f64 + 0.5) * CELL_M, (y as f64 + 0.5) * CELL_M)
 }
 
-/// Groups of cells that are free in one world and not in the other, without specks.
-fn things(worlds: &[World; 2]) -> Vec<Vec<Cell>> {
+/// Quarters of a cell: the pixels of the worlds.
+fn quarters(cell: Cell) -> [Point2; 4] {
+    let middle = point_of(cell);
+    let quarter = CELL_M / 4.0;
+    [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)]
+        .map(|(x, y)| Point2::new(middle.x + x * quarter, middle.y + y * quarter))
+}
+
+fn num_differing(worlds: &[World; 2], cell: Cell) -> usize {
+    quarters(cell).iter().filter(|point| worlds[0].is_free(point) != worlds[1].is_free(point)).count()
+}
+
+/// Surface of a thing, m².
+fn thing_m2(worlds: &[World; 2], thing: &[Cell]) -> f64 {
+    thing.iter().map(|cell| num_differing(worlds, *cell)).sum::<usize>() as f64 * CELL_M * CELL_M / 4.0
+}
+
+/// Cells of which some part is free in one world and not in the other.
+fn differing_cells(worlds: &[World; 2]) -> BTreeSet<Cell> {
     let (low, size) = (worlds[0].origin(), worlds[0].size());
     let first = cell_of(&low);
     let (width, height) = (
         (size.0 as f64 * worlds[0].resolution_m() / CELL_M) as i64,
         (size.1 as f64 * worlds[0].resolution_m() / CELL_M) as i64,
     );
-    let mut left: BTreeSet<Cell> = (0..width)
+    (0..width)
         .flat_map(|x| (0..height).map(move |y| (first.0 + x, first.1 + y)))
-        .filter(|cell| worlds[0].is_free(&point_of(*cell)) != worlds[1].is_free(&point_of(*cell)))
-        .collect();
+        .filter(|cell| num_differing(worlds, *cell) > 0)
+        .collect()
+}
+
+/// Groups of differing cells.
+fn things(cells: &BTreeSet<Cell>) -> Vec<Vec<Cell>> {
+    let mut left = cells.clone();
     let steps = (JOIN_M / CELL_M) as i64;
     let mut things = Vec::new();
     while let Some(seed) = left.pop_first() {
@@ -278,9 +311,7 @@ fn things(worlds: &[World; 2]) -> Vec<Vec<Cell>> {
                 }
             }
         }
-        if thing.len() as f64 * CELL_M * CELL_M >= 0.05 {
-            things.push(thing);
-        }
+        things.push(thing);
     }
     things
 }

@@ -213,6 +213,11 @@ class Site:
         query = {"component": component, "version": version}
         return self._transport.all(models.Place, routes.LIST_PLACES, self.name, query=query)
 
+    def rooms(self, component: int | None = None, version: int | None = None) -> Iterator[models.Room]:
+        """Rooms, corridors and halls with the doors between them; ids survive rebuilds."""
+        query = {"component": component, "version": version}
+        return self._transport.all(models.Room, routes.LIST_ROOMS, self.name, query=query)
+
     def labels(self, version: int | None = None) -> Iterator[models.Label]:
         """What kind of place each stretch of driving is."""
         return self._transport.all(models.Label, routes.LIST_LABELS, self.name, query={"version": version})
@@ -231,6 +236,35 @@ class Site:
         (from_x, from_y), (to_x, to_y) = start, goal
         query = {"from_x": from_x, "from_y": from_y, "to_x": to_x, "to_y": to_y, "component": component}
         return self._transport.get(models.Route, routes.GET_ROUTE, self.name, query=query)
+
+    # annotations
+
+    def annotations(
+        self, kind: str | None = None, component: int | None = None, version: int | None = None
+    ) -> Iterator[models.Annotation]:
+        """What people drew, where it lies in a map."""
+        query = {"kind": kind, "component": component, "version": version}
+        return self._transport.all(models.Annotation, routes.LIST_ANNOTATIONS, self.name, query=query)
+
+    def annotation(self, annotation: str) -> models.Annotation:
+        """One annotation where it lies in the served map."""
+        return self._transport.get(models.Annotation, routes.GET_ANNOTATION, self.name, annotation)
+
+    def annotate(self, kind: str, name: str, geometry: dict[str, object], component: int = 0) -> models.Annotation:
+        """Draws a GeoJSON shape, in metres; it moves with the places around it. Kind `room` names a room."""
+        body = {"kind": kind, "name": name, "component": component, "geometry": geometry}
+        return self._transport.get(models.Annotation, routes.MAKE_ANNOTATION, self.name, json=body)
+
+    def change_annotation(
+        self, annotation: str, kind: str, name: str, geometry: dict[str, object], component: int = 0
+    ) -> models.Annotation:
+        """Draws something else in the place of an annotation."""
+        body = {"kind": kind, "name": name, "component": component, "geometry": geometry}
+        return self._transport.get(models.Annotation, routes.CHANGE_ANNOTATION, self.name, annotation, json=body)
+
+    def delete_annotation(self, annotation: str) -> None:
+        """Forgets an annotation."""
+        self._transport.send(routes.DELETE_ANNOTATION, self.name, annotation)
 
     # matches
 

@@ -282,6 +282,10 @@ pub struct RouteStep {
     pub length_m: f64,
     /// How it is left.
     pub turn: RouteTurn,
+    /// Id of the room in which it lies; null where no room is known.
+    pub room: Option<u64>,
+    /// Middle of the door through which the room is left at its end; null where it ends otherwise.
+    pub door: Option<Point>,
     /// What a person would say.
     pub text: String,
 }
@@ -309,6 +313,15 @@ pub enum ChangeKind {
     Disappeared,
 }
 
+/// A visit that saw a changed area.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ChangeVisit {
+    /// The run.
+    pub run: String,
+    /// When the visit ended, if it saw the area as it was; when it began, if it saw it as it is.
+    pub timestamp_ns: i64,
+}
+
 /// An area that changed: something came or went.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
@@ -329,4 +342,8 @@ pub struct Change {
     pub density_change: Option<f64>,
     /// How clearly the scans and densities of both sessions tell, from 0 to 1.
     pub confidence: f64,
+    /// The last visit that saw it as it was; null when no single one saw enough of it.
+    pub last_as_before: Option<ChangeVisit>,
+    /// The first visit that saw it as it is; what happened, happened between the two.
+    pub first_as_after: Option<ChangeVisit>,
 }

@@ -8,6 +8,7 @@ mod keys;
 mod localizations;
 mod maps;
 mod matches;
+mod rooms;
 mod runs;
 mod sites;
 mod texts;
@@ -21,13 +22,14 @@ pub use localizations::{
     NewLocalization, PosePrior,
 };
 pub use maps::{
-    Change, ChangeKind, Component, Connection, ConnectionKind, Grid, GridInfo, KeyframePose, Label,
-    LabelAnswer, LabelPattern, LabelQuery, Map, MapRun, MapStatistics, Place, PlaceLabel, Region, Route,
-    RouteStep, RouteTurn, Turn,
+    Change, ChangeKind, ChangeVisit, Component, Connection, ConnectionKind, Grid, GridInfo, KeyframePose,
+    Label, LabelAnswer, LabelPattern, LabelQuery, Map, MapRun, MapStatistics, Place, PlaceLabel, Region,
+    Route, RouteStep, RouteTurn, Turn,
 };
 pub use matches::{
     Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,
 };
+pub use rooms::{Annotation, Door, NewAnnotation, Room, RoomLabel, Shape};
 pub use runs::{Geometry, NewRun, Receipt, Run, RunState, Scan, StoredScan};
 pub use sites::{ChangedSite, Retention, Site, SiteChange, SiteState, SiteSummary};
 pub use texts::{

@@ -6,7 +6,7 @@ use super::config::RoomsConfig;
 use super::floor::Floor;
 use super::{Door, Room, RoomKind, RoomMap};
 use crate::geometry::Point2;
-use crate::semantics::outline::outline;
+use crate::semantics::outline::{rings, simplified};
 
 /// Numbers the regions in the order of their first cells and measures them.
 pub(super) fn describe(
@@ -34,7 +34,7 @@ pub(super) fn describe(
         kind: kind(floor, thickness, cells, config),
         area_m2: cells.len() as f64 * floor.cell_m2(),
         center: deepest(&place, clearance, cells),
-        outline: place.outline(cells),
+        rings: place.rings(cells),
         neighbors: neighbors(&doors, number),
     });
     RoomMap {
@@ -62,11 +62,17 @@ impl Place<'_> {
         )
     }
 
-    fn outline(&self, cells: &[usize]) -> Vec<Point2> {
+    fn rings(&self, cells: &[usize]) -> Vec<Vec<Point2>> {
         let at = |&cell: &usize| ((cell % self.floor.width) as i64, (cell / self.floor.width) as i64);
         let cells: Vec<(i64, i64)> = cells.iter().map(at).collect();
-        let ring = outline(&cells, self.floor.resolution_m);
-        ring.iter().map(|point| Point2::new(self.origin.x + point.x, self.origin.y + point.y)).collect()
+        // A wall is not known better than to a cell, and millimetres are more than enough.
+        let whole_mm = |meters: f64| (meters * 1e3).round() / 1e3;
+        let in_map = |point: &Point2| {
+            Point2::new(whole_mm(self.origin.x + point.x), whole_mm(self.origin.y + point.y))
+        };
+        let simple =
+            |ring: &Vec<Point2>| simplified(ring, self.floor.resolution_m).iter().map(in_map).collect();
+        rings(&cells, self.floor.resolution_m).iter().map(simple).collect()
     }
 }
 

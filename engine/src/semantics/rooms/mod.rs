@@ -9,11 +9,14 @@
 //! that covers it, which is what a person would call half the width of the space there (MAORIS calls it the free-space
 //! image). A crossing or a row of doors makes the clearance of a corridor rise and fall, so a saddle alone is no door;
 //! the median thickness around it hardly notices.
+//!
+//! [`MapRooms`] does so for every component of a map and gives each room the id that it had in the map before.
 
 mod basins;
 mod config;
 mod describe;
 mod floor;
+mod known;
 mod mouths;
 #[cfg(test)]
 mod tests;
@@ -22,6 +25,7 @@ mod thickness;
 use serde::{Deserialize, Serialize};
 
 pub use config::RoomsConfig;
+pub use known::{ComponentRooms, KnownDoor, KnownRoom, MapRooms, RoomsBefore};
 
 use crate::geometry::{Point2, distance_to_blocked};
 use crate::occupancy::GridMap;
@@ -48,8 +52,9 @@ pub struct Room {
     pub area_m2: f64,
     /// The position in it that is farthest from any wall.
     pub center: Point2,
-    /// Its outer border, counter-clockwise, closed implicitly, map frame.
-    pub outline: Vec<Point2>,
+    /// Its outer border, counter-clockwise, then those of what stands in it, clockwise; each closed implicitly, to within a
+    /// cell, map frame.
+    pub rings: Vec<Vec<Point2>>,
     /// Numbers of the rooms that an opening joins it to, ascending.
     pub neighbors: Vec<u32>,
 }

@@ -126,7 +126,7 @@ proptest! {
         }
         for (room, num_cells) in found.rooms.iter().zip(num_cells) {
             prop_assert!((room.area_m2 - f64::from(num_cells) * 0.04).abs() < 1e-9);
-            prop_assert!(room.area_m2 >= 0.2 - 1e-9 && room.outline.len() >= 4);
+            prop_assert!(room.area_m2 >= 0.2 - 1e-9 && room.rings[0].len() >= 3);
         }
         for door in &found.doors {
             let (first, second) = door.rooms;

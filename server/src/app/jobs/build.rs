@@ -13,11 +13,13 @@ use locution_engine::mapping::{
     PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, place_observations,
     weigh_texts,
 };
-use locution_engine::semantics::MapLabels;
+use locution_engine::semantics::{MapLabels, MapRooms, RoomsBefore};
 use locution_engine::text::{Observation, Word};
 use sha2::{Digest as _, Sha256};
 
-use crate::app::maps::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};
+use crate::app::maps::{
+    MapDraft, WrittenRun, drop_versions, keep_annotations, note_made_of, rooms_before, serve_map,
+};
 use crate::app::runs::{end_deletions, pending_deletions};
 use crate::app::site::{BuildStage, Progress, Site, SiteEvent};
 use crate::app::{App, AppError, on_blocking_thread};
@@ -88,16 +90,22 @@ impl App {
         }
         drop(snapshot);
         let written: Vec<WrittenRun> = loaded.iter().map(written_run).collect();
-        let MadeMap { map, labels, match_places } =
-            map_runs(site, Arc::clone(&state.config), loaded, decisions, progress).await?;
+        let before = match &serving {
+            Some(serving) => rooms_before(serving).await?,
+            None => RoomsBefore::default(),
+        };
+        let made = map_runs(site, Arc::clone(&state.config), loaded, decisions, before, progress).await?;
         progress.at(BuildStage::Writing, 0.0)?;
-        let draft = MapDraft::new(site, &map, &labels, &match_places, &written, made_of)?;
-        drop((map, labels, match_places));
+        let draft = made.as_draft(site, &written, made_of)?;
+        drop(made);
         if let Some(map) = serving.as_ref().filter(|map| draft.is_same_as(&map.record)) {
             note_made_of(site, &map.record, made_of).await?;
             return self.stands(site, map, &deleted, progress).await;
         }
         let map = draft.write(site, started.elapsed().as_secs_f64()).await?;
+        if let Some(serving) = &serving {
+            keep_annotations(site, serving, &deleted).await?;
+        }
         serve_map(site, map.record.version).await?;
         tell_of(site, &map);
         self.tidy_up(site, &map, &deleted, progress).await?;
@@ -224,6 +232,13 @@ struct MadeMap {
     map: SiteMap,
     labels: MapLabels,
     match_places: Vec<Option<MatchPlace>>,
+    rooms: MapRooms,
+}
+
+impl MadeMap {
+    fn as_draft(&self, site: &Site, runs: &[WrittenRun], made_of: Digest) -> Result<MapDraft, AppError> {
+        MapDraft::new(site, &self.map, &self.labels, &self.rooms, &self.match_places, runs, made_of)
+    }
 }
 
 /// Where and when the stretches of all matches were driven.
@@ -266,13 +281,15 @@ async fn map_runs(
     config: Arc<EngineConfig>,
     runs: Vec<LoadedRun>,
     decisions: Vec<Decision>,
+    before: RoomsBefore,
     progress: &Arc<Progress>,
 ) -> Result<MadeMap, AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
         let nowhere = MappedRun::default();
         let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
         let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
-        return Ok(MadeMap { map, labels, match_places: Vec::new() });
+        let rooms = MapRooms { next_id: before.rooms.next_id, ..MapRooms::default() };
+        return Ok(MadeMap { map, labels, match_places: Vec::new(), rooms });
     }
     let mut memo = site.registrations.take(site.store()).await?;
     let (progress, site) = (Arc::clone(progress), Arc::clone(site));
@@ -303,7 +320,8 @@ async fn map_runs(
         progress.at(BuildStage::Weighing, 0.5)?;
         let labels = MapLabels::of(&records, &map, &config.semantics);
         let match_places = match_places(&records, &map);
-        Ok(MadeMap { map, labels, match_places })
+        let rooms = MapRooms::of(&records, &map, &config.semantics.rooms, &before);
+        Ok(MadeMap { map, labels, match_places, rooms })
     })
     .await?
 }

@@ -78,6 +78,25 @@ impl Sessions {
     }
 }
 
+/// A visit that saw a changed area.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ChangeVisit {
+    /// Name of the run.
+    pub run: String,
+    /// When it ended, if it saw the area as it was; when it began, if it saw it as it is. Nanoseconds.
+    pub timestamp_ns: i64,
+}
+
+/// A change, and between which two visits it happened.
+#[derive(Clone, Debug)]
+pub struct DatedChange {
+    pub change: Change,
+    /// The last that saw it as it was.
+    pub last_as_before: Option<ChangeVisit>,
+    /// The first that saw it as it is.
+    pub first_as_after: Option<ChangeVisit>,
+}
+
 /// A run as the comparison wants it.
 struct LoadedRun {
     geometry: ScanGeometry,
@@ -128,7 +147,7 @@ impl App {
         site: &Site,
         map: &Map,
         sessions: &Sessions,
-    ) -> Result<Vec<Change>, AppError> {
+    ) -> Result<Vec<DatedChange>, AppError> {
         // One comparison or drawing at a time bounds the memory that they take.
         let _turn = self.drawing.lock().await;
         let (mut before, mut after) = (Vec::new(), Vec::new());
@@ -139,9 +158,31 @@ impl App {
             after.push(LoadedRun::load(map, run).await?);
         }
         let config = site.state().config.mapping.changes.clone();
-        on_blocking_thread(move || find_changes(&placed(&before), &placed(&after), &config))
+        let runs = sessions.before.iter().chain(&sessions.after).map(|run| run.name.clone());
+        let loaded = before.iter().chain(&after);
+        let visits: Vec<(String, Option<i64>, Option<i64>)> = runs
+            .zip(loaded)
+            .map(|(name, run)| {
+                let time = |keyframe: Option<&Keyframe>| keyframe.map(|keyframe| keyframe.timestamp_ns);
+                (name, time(run.keyframes.first()), time(run.keyframes.last()))
+            })
+            .collect();
+        let changes = on_blocking_thread(move || find_changes(&placed(&before), &placed(&after), &config))
             .await?
-            .map_err(AppError::internal)
+            .map_err(AppError::internal)?;
+        let visit = |(name, timestamp_ns): (&String, Option<i64>)| {
+            timestamp_ns.map(|timestamp_ns| ChangeVisit { run: name.clone(), timestamp_ns })
+        };
+        let dated = |change: Change| {
+            let last = change.last_as_before.and_then(|idx| visits.get(idx));
+            let first = change.first_as_after.and_then(|idx| visits.get(idx));
+            DatedChange {
+                last_as_before: last.and_then(|(name, _, ended_ns)| visit((name, *ended_ns))),
+                first_as_after: first.and_then(|(name, began_ns, _)| visit((name, *began_ns))),
+                change,
+            }
+        };
+        Ok(changes.into_iter().map(dated).collect())
     }
 }
 

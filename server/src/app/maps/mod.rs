@@ -1,5 +1,6 @@
 //! Map versions: written whole, then served; what they hold, and the forms in which other tools read them.
 
+mod annotations;
 mod changes;
 mod exports;
 mod grids;
@@ -7,9 +8,14 @@ mod labels;
 mod matches;
 mod places;
 mod regions;
+mod rooms;
 mod write;
 
-pub use changes::{NoSessions, Sessions};
+pub use annotations::{
+    GivenAnnotation, PlacedAnnotation, an_annotation, annotate, annotations, change_annotation,
+    delete_annotation, keep_annotations,
+};
+pub use changes::{ChangeVisit, DatedChange, NoSessions, Sessions};
 pub use exports::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
 pub use grids::GridKey;
 pub use labels::{DrivenStretch, LabelAnswer, find_labels, labels};
@@ -18,4 +24,5 @@ pub use matches::{
 };
 pub use places::{find_route, places};
 pub use regions::{Topology, topology};
+pub use rooms::{names_of_rooms, rooms, rooms_before};
 pub use write::{MapDraft, WrittenRun, drop_versions, note_made_of, serve_map};

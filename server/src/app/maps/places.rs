@@ -1,8 +1,9 @@
 //! Ways between the places of a map.
 
 use locution_engine::geometry::Point2;
-use locution_engine::semantics::{PlaceMap, Route, route};
+use locution_engine::semantics::{NamedRooms, PlaceMap, Route, route};
 
+use super::rooms::names_of_rooms;
 use crate::app::{AppError, on_blocking_thread};
 use crate::records::Map;
 
@@ -23,7 +24,13 @@ pub async fn places(map: &Map, component: u32) -> Result<PlaceMap, AppError> {
 /// [`AppError::NotFound`] when no way is known or a position is off the map.
 pub async fn find_route(map: &Map, component: u32, from: Point2, to: Point2) -> Result<Route, AppError> {
     let places = places(map, component).await?;
-    let found = on_blocking_thread(move || route(&places, &from, &to, REACH_M)).await?;
+    let names = names_of_rooms(map).await?;
+    let rooms = map.rooms().await?;
+    let found = on_blocking_thread(move || {
+        let of_component = rooms.as_ref().and_then(|rooms| rooms.component(component));
+        route(&places, &NamedRooms { rooms: of_component, names }, &from, &to, REACH_M)
+    })
+    .await?;
     found
         .ok_or_else(|| AppError::not_found("way", format!("({}, {}) → ({}, {})", from.x, from.y, to.x, to.y)))
 }

@@ -1,14 +1,14 @@
 //! Map versions: written whole into fresh keys, then served; kept for a while, asked for by number.
 
 use locution_engine::mapping::{MatchState, SiteMap};
-use locution_engine::semantics::MapLabels;
+use locution_engine::semantics::{MapLabels, MapRooms};
 use sha2::{Digest as _, Sha256};
 
 use crate::app::AppError;
 use crate::app::site::Site;
 use crate::records::{
     Digest, Key, Map, MapPose, MapRecord, MapRun, MapVersion, MatchPlace, PartKind, RunIdx, StoredLabel,
-    append_places, delete_prefixes, match_chunks, series,
+    append_places, append_rooms, delete_prefixes, match_chunks, series,
 };
 use crate::storage::{Batch, SiteStore, StorageError};
 
@@ -40,6 +40,7 @@ impl MapDraft {
         site: &Site,
         map: &SiteMap,
         labeled: &MapLabels,
+        rooms: &MapRooms,
         match_places: &[Option<MatchPlace>],
         runs: &[WrittenRun],
         made_of: Digest,
@@ -84,6 +85,7 @@ impl MapDraft {
         for (component, places) in &labeled.places {
             append_places(&mut values, version, *component, places).map_err(AppError::internal)?;
         }
+        append_rooms(&mut values, version, rooms).map_err(AppError::internal)?;
         for (key, chunk) in match_chunks(version, &map.matches).map_err(AppError::internal)? {
             values.put(key.encode(), chunk);
         }

@@ -2,12 +2,12 @@
 
 use axum::Json;
 use axum::extract::State;
-use locution_engine::mapping::{Change, ChangeKind};
+use locution_engine::mapping::ChangeKind;
 use serde::{Deserialize, Serialize};
 use utoipa::{IntoParams, ToSchema};
 
 use crate::app::AppError;
-use crate::app::maps::{NoSessions, Sessions};
+use crate::app::maps::{ChangeVisit, DatedChange, NoSessions, Sessions};
 use crate::error::ApiError;
 use crate::extract::{Paged, SiteOf};
 use crate::http::values::{Page, PageParams, PointDto};
@@ -42,6 +42,21 @@ pub enum ChangeKindDto {
     Disappeared,
 }
 
+/// A visit that saw a changed area.
+#[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
+pub struct ChangeVisitDto {
+    /// The run.
+    pub run: String,
+    /// When the visit ended, if it saw the area as it was; when it began, if it saw it as it is.
+    pub timestamp_ns: i64,
+}
+
+impl From<&ChangeVisit> for ChangeVisitDto {
+    fn from(visit: &ChangeVisit) -> Self {
+        Self { run: visit.run.clone(), timestamp_ns: visit.timestamp_ns }
+    }
+}
+
 /// An area that changed: something came or went.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct ChangeDto {
@@ -64,11 +79,16 @@ pub struct ChangeDto {
     /// How clearly the scans and densities of both sessions tell, from 0 to 1.
     #[schema(minimum = 0, maximum = 1)]
     pub confidence: f64,
+    /// The last visit that saw it as it was; null when no single one saw enough of it.
+    pub last_as_before: Option<ChangeVisitDto>,
+    /// The first visit that saw it as it is; what happened, happened between the two.
+    pub first_as_after: Option<ChangeVisitDto>,
 }
 
 impl ChangeDto {
     /// A change in a component.
-    pub fn new(component: u32, change: &Change) -> Self {
+    pub fn new(component: u32, dated: &DatedChange) -> Self {
+        let change = &dated.change;
         let kind = match change.kind {
             ChangeKind::Appeared => ChangeKindDto::Appeared,
             ChangeKind::Disappeared => ChangeKindDto::Disappeared,
@@ -82,6 +102,8 @@ impl ChangeDto {
             area_m2: change.area_m2,
             density_change: change.density_change,
             confidence: change.confidence,
+            last_as_before: dated.last_as_before.as_ref().map(ChangeVisitDto::from),
+            first_as_after: dated.first_as_after.as_ref().map(ChangeVisitDto::from),
         }
     }
 }

@@ -91,6 +91,10 @@ pub struct RouteStepDto {
     pub length_m: f64,
     /// How it is left.
     pub turn: RouteTurnDto,
+    /// Id of the room in which it lies; null where no room is known.
+    pub room: Option<u64>,
+    /// Middle of the door through which the room is left at its end; null where it ends otherwise.
+    pub door: Option<PointDto>,
     /// What a person would say.
     pub text: String,
 }
@@ -103,7 +107,15 @@ impl From<RouteStep> for RouteStepDto {
             Turn::Right => RouteTurnDto::Right,
             Turn::Back => RouteTurnDto::Back,
         };
-        Self { place: step.place, label: step.label.into(), length_m: step.length_m, turn, text: step.text }
+        Self {
+            place: step.place,
+            label: step.label.into(),
+            length_m: step.length_m,
+            turn,
+            room: step.room,
+            door: step.door.as_ref().map(PointDto::from),
+            text: step.text,
+        }
     }
 }
 
@@ -146,7 +158,7 @@ pub async fn list_places(
     Ok(Json(Page::of_all(items, places.places.len(), page)))
 }
 
-/// The shortest way over driven ground, told place by place.
+/// The shortest way over driven ground, told place by place and door by door.
 #[utoipa::path(get, path = "/v1/sites/{site}/route", operation_id = "get_route", tag = "maps",
     params(RouteParams),
     responses((status = 200, description = "The route", body = RouteDto),

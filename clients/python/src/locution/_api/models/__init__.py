@@ -1,17 +1,22 @@
 """Contains all the data models used in inputs/outputs"""
 
+from .annotation import Annotation
+from .annotation_page import AnnotationPage
 from .batch import Batch
 from .change import Change
 from .change_kind import ChangeKind
 from .change_page import ChangePage
+from .change_visit import ChangeVisit
 from .changed_site import ChangedSite
 from .channel import Channel
+from .collection_type import CollectionType
 from .component import Component
 from .connection import Connection
 from .connection_kind import ConnectionKind
 from .decision_body import Decision
 from .decision_kind import DecisionKind
 from .direction import Direction
+from .door import Door
 from .event_type_0 import EventType0
 from .event_type_0_event import EventType0Event
 from .event_type_1 import EventType1
@@ -31,6 +36,11 @@ from .example_answer import ExampleAnswer
 from .example_evidence import ExampleEvidence
 from .example_place import ExamplePlace
 from .example_query import ExampleQuery
+from .feature import Feature
+from .feature_collection import FeatureCollection
+from .feature_kind import FeatureKind
+from .feature_properties import FeatureProperties
+from .feature_type import FeatureType
 from .geometry import Geometry
 from .get_grid_yaml_response_200 import GetGridYamlResponse200
 from .get_trajectory_frame import GetTrajectoryFrame
@@ -70,6 +80,7 @@ from .match import Match
 from .match_page import MatchPage
 from .match_state import MatchState
 from .missing import Missing
+from .new_annotation import NewAnnotation
 from .new_key import NewKey
 from .new_localization import NewLocalization
 from .new_run import NewRun
@@ -89,6 +100,9 @@ from .region import Region
 from .registration import Registration
 from .rejection_reason import RejectionReason
 from .retention import Retention
+from .room import Room
+from .room_label import RoomLabel
+from .room_page import RoomPage
 from .route import Route
 from .route_step import RouteStep
 from .route_turn import RouteTurn
@@ -97,6 +111,12 @@ from .run_change import RunChange
 from .run_page import RunPage
 from .run_state import RunState
 from .scan import Scan
+from .shape_type_0 import ShapeType0
+from .shape_type_0_type import ShapeType0Type
+from .shape_type_1 import ShapeType1
+from .shape_type_1_type import ShapeType1Type
+from .shape_type_2 import ShapeType2
+from .shape_type_2_type import ShapeType2Type
 from .site import Site
 from .site_change import SiteChange
 from .site_change_config_type_0 import SiteChangeConfigType0
@@ -117,18 +137,23 @@ from .word_pattern import WordPattern
 from .word_query import WordQuery
 
 __all__ = (
+    "Annotation",
+    "AnnotationPage",
     "Batch",
     "Change",
     "ChangedSite",
     "ChangeKind",
     "ChangePage",
+    "ChangeVisit",
     "Channel",
+    "CollectionType",
     "Component",
     "Connection",
     "ConnectionKind",
     "Decision",
     "DecisionKind",
     "Direction",
+    "Door",
     "EventType0",
     "EventType0Event",
     "EventType1",
@@ -148,6 +173,11 @@ __all__ = (
     "ExampleEvidence",
     "ExamplePlace",
     "ExampleQuery",
+    "Feature",
+    "FeatureCollection",
+    "FeatureKind",
+    "FeatureProperties",
+    "FeatureType",
     "Geometry",
     "GetGridYamlResponse200",
     "GetTrajectoryFrame",
@@ -187,6 +217,7 @@ __all__ = (
     "MatchPage",
     "MatchState",
     "Missing",
+    "NewAnnotation",
     "NewKey",
     "NewLocalization",
     "NewRun",
@@ -206,6 +237,9 @@ __all__ = (
     "Registration",
     "RejectionReason",
     "Retention",
+    "Room",
+    "RoomLabel",
+    "RoomPage",
     "Route",
     "RouteStep",
     "RouteTurn",
@@ -214,6 +248,12 @@ __all__ = (
     "RunPage",
     "RunState",
     "Scan",
+    "ShapeType0",
+    "ShapeType0Type",
+    "ShapeType1",
+    "ShapeType1Type",
+    "ShapeType2",
+    "ShapeType2Type",
     "Site",
     "SiteChange",
     "SiteChangeConfigType0",

@@ -10,6 +10,7 @@ from ..models.change_kind import ChangeKind
 from ..types import UNSET, Unset
 
 if TYPE_CHECKING:
+    from ..models.change_visit import ChangeVisit
     from ..models.point import Point
 
 
@@ -30,6 +31,8 @@ class Change:
         confidence (float): How clearly the scans and densities of both sessions tell, from 0 to 1.
         density_change (float | None | Unset): Free-space density observed around it in the second session, minus the
             first; null where one did not pass.
+        last_as_before (ChangeVisit | None | Unset):
+        first_as_after (ChangeVisit | None | Unset):
     """
 
     kind: ChangeKind
@@ -40,9 +43,13 @@ class Change:
     area_m2: float
     confidence: float
     density_change: float | None | Unset = UNSET
+    last_as_before: ChangeVisit | None | Unset = UNSET
+    first_as_after: ChangeVisit | None | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
+        from ..models.change_visit import ChangeVisit  # noqa: PLC0415
+
         kind = self.kind.value
 
         component = self.component
@@ -63,6 +70,22 @@ class Change:
         else:
             density_change = self.density_change
 
+        last_as_before: dict[str, Any] | None | Unset
+        if isinstance(self.last_as_before, Unset):
+            last_as_before = UNSET
+        elif isinstance(self.last_as_before, ChangeVisit):
+            last_as_before = self.last_as_before.to_dict()
+        else:
+            last_as_before = self.last_as_before
+
+        first_as_after: dict[str, Any] | None | Unset
+        if isinstance(self.first_as_after, Unset):
+            first_as_after = UNSET
+        elif isinstance(self.first_as_after, ChangeVisit):
+            first_as_after = self.first_as_after.to_dict()
+        else:
+            first_as_after = self.first_as_after
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -78,11 +101,16 @@ class Change:
         )
         if density_change is not UNSET:
             field_dict["density_change"] = density_change
+        if last_as_before is not UNSET:
+            field_dict["last_as_before"] = last_as_before
+        if first_as_after is not UNSET:
+            field_dict["first_as_after"] = first_as_after
 
         return field_dict
 
     @classmethod
     def from_dict(cls: type[T], src_dict: Mapping[str, Any]) -> T:
+        from ..models.change_visit import ChangeVisit  # noqa: PLC0415
         from ..models.point import Point  # noqa: PLC0415
 
         d = dict(src_dict)
@@ -109,6 +137,40 @@ class Change:
 
         density_change = _parse_density_change(d.pop("density_change", UNSET))
 
+        def _parse_last_as_before(data: object) -> ChangeVisit | None | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            try:
+                if not isinstance(data, dict):
+                    raise TypeError()
+                last_as_before_type_0 = ChangeVisit.from_dict(data)
+
+                return last_as_before_type_0
+            except (TypeError, ValueError, AttributeError, KeyError):
+                pass
+            return cast(ChangeVisit | None | Unset, data)
+
+        last_as_before = _parse_last_as_before(d.pop("last_as_before", UNSET))
+
+        def _parse_first_as_after(data: object) -> ChangeVisit | None | Unset:
+            if data is None:
+                return data
+            if isinstance(data, Unset):
+                return data
+            try:
+                if not isinstance(data, dict):
+                    raise TypeError()
+                first_as_after_type_0 = ChangeVisit.from_dict(data)
+
+                return first_as_after_type_0
+            except (TypeError, ValueError, AttributeError, KeyError):
+                pass
+            return cast(ChangeVisit | None | Unset, data)
+
+        first_as_after = _parse_first_as_after(d.pop("first_as_after", UNSET))
+
         change = cls(
             kind=kind,
             component=component,
@@ -118,6 +180,8 @@ class Change:
             area_m2=area_m2,
             confidence=confidence,
             density_change=density_change,
+            last_as_before=last_as_before,
+            first_as_after=first_as_after,
         )
 
         change.additional_properties = d

@@ -4,15 +4,24 @@
 //! occupied, with no obstacle nearby that a small error of the poses could have moved there, has changed; changed
 //! cells that touch form an area. The density profiles of the two sets, averaged around the area, are evidence of
 //! their own: where something appeared the free-space density falls, where it went it rises (thesis Fig 5.5).
+//!
+//! What merely was not seen is no change: a cell must have been judged in both sets. Each run by itself then says whether
+//! it saw an area as it was or as it is, which dates the change between two visits.
+
+mod config;
+mod history;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
+pub use config::ChangesConfig;
+use history::date;
+
 use super::run::Keyframe;
 use crate::config_error::ConfigError;
 use crate::geometry::{Point2, Pose2};
-use crate::occupancy::{CellCounts, CellIndex, OccupancyConfig, TiledOccupancy};
+use crate::occupancy::{CellCounts, CellIndex, TiledOccupancy};
 use crate::scan::ScanGeometry;
 
 /// One run placed in the map.
@@ -26,71 +35,6 @@ pub struct PlacedRun<'a> {
     pub map_from_keyframes: &'a [Pose2],
     /// Where the density was sampled and what it was, first kernel.
     pub densities: &'a [(Point2, f32)],
-}
-
-/// Settings of the comparison.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ChangesConfig {
-    /// How the runs are drawn.
-    pub occupancy: OccupancyConfig,
-    /// An obstacle within this distance of one in the other set has not changed: poses and walls are not sharper,
-    /// metres.
-    pub tolerance_m: f64,
-    /// Scans that must agree on a cell: that saw a return in it in the one set, and judged it in the other. A person who
-    /// walks by leaves fewer returns.
-    pub num_scans_min: u16,
-    /// A cell is surely free when at most this share of its scans saw a return in it.
-    pub free_share_max: f64,
-    /// Changed cells closer than this belong to one area, metres.
-    pub join_m: f64,
-    /// Areas with less than this surface of changed cells are noise, m².
-    pub area_min_m2: f64,
-    /// Densities sampled within this distance of an area speak for or against it, metres.
-    pub profile_radius_m: f64,
-}
-
-impl Default for ChangesConfig {
-    fn default() -> Self {
-        Self {
-            occupancy: OccupancyConfig { range_limit_m: 9.0, ..OccupancyConfig::default() },
-            tolerance_m: 0.25,
-            num_scans_min: 3,
-            free_share_max: 0.05,
-            join_m: 0.35,
-            area_min_m2: 0.05,
-            profile_radius_m: 1.5,
-        }
-    }
-}
-
-impl ChangesConfig {
-    /// Checks every value; `path` is prefixed to the name of the offending field.
-    ///
-    /// # Errors
-    /// The first field that cannot work.
-    pub fn validate(&self, path: &str) -> Result<(), ConfigError> {
-        self.occupancy.validate(&format!("{path}.occupancy"))?;
-        let values = [
-            ("tolerance_m", self.tolerance_m, 0.0, 2.0),
-            ("free_share_max", self.free_share_max, 0.0, 0.5),
-            ("join_m", self.join_m, 0.0, 5.0),
-            ("area_min_m2", self.area_min_m2, 0.0, 100.0),
-            ("profile_radius_m", self.profile_radius_m, 0.0, 20.0),
-        ];
-        for (name, value, low, high) in values {
-            if !(low..=high).contains(&value) {
-                return Err(ConfigError::new(
-                    format!("{path}.{name}"),
-                    format!("must be in [{low}, {high}]"),
-                ));
-            }
-        }
-        if self.num_scans_min == 0 {
-            return Err(ConfigError::new(format!("{path}.num_scans_min"), "must be at least 1"));
-        }
-        Ok(())
-    }
 }
 
 /// Whether something came or went.
@@ -120,6 +64,17 @@ pub struct Change {
     pub density_change: Option<f64>,
     /// In [0, 1]: how clearly the scans of both sets tell, and whether the densities agree.
     pub confidence: f64,
+    /// Where in the runs of both sets, those before first, somebody last saw it as it was; `None` when no single run saw
+    /// enough of it.
+    pub last_as_before: Option<usize>,
+    /// Where in those runs somebody first saw it as it is, behind the former.
+    pub first_as_after: Option<usize>,
+}
+
+/// A changed area with its cells.
+struct Found {
+    change: Change,
+    cells: Vec<CellIndex>,
 }
 
 /// Lists what changed from `before` to `after`, largest surface first.
@@ -136,7 +91,7 @@ pub fn find_changes(
 ) -> Result<Vec<Change>, ConfigError> {
     config.validate("changes")?;
     let (old, new) = (draw(before, config)?, draw(after, config)?);
-    let mut changes = Vec::new();
+    let mut found = Vec::new();
     for (kind, occupied, free) in [(ChangeKind::Appeared, &new, &old), (ChangeKind::Disappeared, &old, &new)]
     {
         let cells = changed_cells(occupied, free, config);
@@ -146,9 +101,12 @@ pub fn find_changes(
                 continue;
             }
             weigh_densities(&mut change, before, after, config);
-            changes.push(change);
+            found.push(Found { change, cells: area });
         }
     }
+    drop((old, new));
+    date(&mut found, before, after, config)?;
+    let mut changes: Vec<Change> = found.into_iter().map(|found| found.change).collect();
     changes.sort_by(|a, b| {
         b.area_m2
             .total_cmp(&a.area_m2)
@@ -205,6 +163,16 @@ fn is_occupied(counts: CellCounts, config: &ChangesConfig) -> bool {
         && f64::from(counts.num_hits) >= config.occupancy.occupied_share_min * f64::from(num_scans(counts))
 }
 
+/// Share of the scans of some cells that saw a return in them.
+fn hit_share(grid: &TiledOccupancy, cells: &[CellIndex]) -> f64 {
+    let add = |(hits, scans), cell: &CellIndex| {
+        let counts = grid.counts(*cell);
+        (hits + u32::from(counts.num_hits), scans + num_scans(counts))
+    };
+    let (num_hits, num_scans) = cells.iter().fold((0, 0), add);
+    f64::from(num_hits) / f64::from(num_scans.max(1))
+}
+
 /// Rises from 0 to 1 with the scans that agree on a cell: n of them leave 1/(n + 1) of doubt (Laplace's rule).
 fn clearness(counts: CellCounts) -> f64 {
     let agreeing = f64::from(counts.num_hits.max(counts.num_misses));
@@ -254,7 +222,17 @@ fn describe(
         confidence += clearness[cell] / count;
     }
     let area_m2 = count * grid.resolution_m() * grid.resolution_m();
-    Change { kind, center, low, high, area_m2, density_change: None, confidence }
+    Change {
+        kind,
+        center,
+        low,
+        high,
+        area_m2,
+        density_change: None,
+        confidence,
+        last_as_before: None,
+        first_as_after: None,
+    }
 }
 
 /// Share of the confidence that densities of the wrong sign take away.
@@ -297,111 +275,4 @@ fn mean_density(runs: &[PlacedRun<'_>], change: &Change, config: &ChangesConfig)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A box in the world: low corner, high corner.
-    type Block = ((f64, f64), (f64, f64));
-
-    fn laser() -> ScanGeometry {
-        ScanGeometry {
-            num_ranges: 180,
-            angle_min_rad: -std::f64::consts::FRAC_PI_2,
-            angle_increment_rad: std::f64::consts::PI / 180.0,
-            range_max_m: 30.0,
-            robot_from_laser: Pose2::identity(),
-        }
-    }
-
-    /// Distance along a ray to the room's walls or the nearest box.
-    fn range_m(pose: &Pose2, angle_rad: f64, blocks: &[Block]) -> f32 {
-        let (sin, cos) = (pose.theta + angle_rad).sin_cos();
-        let slab = |from: f64, way: f64, low: f64, high: f64| {
-            let (a, b) = ((low - from) / way, (high - from) / way);
-            (a.min(b), a.max(b))
-        };
-        let room = {
-            let (_, x) = slab(pose.x, cos, 0.0, 12.0);
-            let (_, y) = slab(pose.y, sin, 0.0, 4.0);
-            x.min(y)
-        };
-        let hit = |((x0, y0), (x1, y1)): &Block| {
-            let (x, y) = (slab(pose.x, cos, *x0, *x1), slab(pose.y, sin, *y0, *y1));
-            let (enter, leave) = (x.0.max(y.0), x.1.min(y.1));
-            (enter <= leave && enter > 0.0).then_some(enter)
-        };
-        blocks.iter().filter_map(hit).fold(room, f64::min) as f32
-    }
-
-    /// A drive down the room and back, poses off by `error_m`.
-    fn drive(blocks: &[Block], error_m: f64) -> (Vec<Keyframe>, Vec<Pose2>) {
-        let there = (0..50).map(|k| Pose2::new(1.0 + 0.2 * f64::from(k), 2.0, 0.0));
-        let back = (0..50).map(|k| Pose2::new(11.0 - 0.2 * f64::from(k), 2.0, std::f64::consts::PI));
-        let poses: Vec<Pose2> = there.chain(back).collect();
-        let keyframe = |pose: &Pose2| Keyframe {
-            scan_seq: 0,
-            timestamp_ns: 0,
-            odom_from_robot: *pose,
-            run_from_robot: *pose,
-            motion_covariance: [[0.0; 3]; 3],
-            ranges_m: (0..180).map(|k| range_m(pose, laser().beam_angle_rad(k), blocks)).collect(),
-        };
-        let keyframes = poses.iter().map(keyframe).collect();
-        (
-            keyframes,
-            poses.iter().map(|pose| Pose2::new(pose.x + error_m, pose.y - error_m, pose.theta)).collect(),
-        )
-    }
-
-    fn compare(before: &[Block], after: &[Block], error_m: f64, densities: [f32; 2]) -> Vec<Change> {
-        let geometry = laser();
-        let (old, new) = (drive(before, 0.0), drive(after, error_m));
-        let samples = densities.map(|density| [(Point2::new(6.0, 2.0), density)]);
-        let old = PlacedRun {
-            geometry: &geometry,
-            keyframes: &old.0,
-            map_from_keyframes: &old.1,
-            densities: &samples[0],
-        };
-        let new = PlacedRun { keyframes: &new.0, map_from_keyframes: &new.1, densities: &samples[1], ..old };
-        find_changes(&[old], &[new], &ChangesConfig::default()).unwrap()
-    }
-
-    const SHELF: Block = ((5.5, 3.2), (6.5, 3.7));
-    const PALLET: Block = ((8.0, 0.4), (8.8, 1.0));
-
-    #[test]
-    fn nothing_changed_where_nothing_changed() {
-        assert!(compare(&[SHELF], &[SHELF], 0.0, [0.5, 0.5]).is_empty());
-        assert!(compare(&[SHELF], &[SHELF], 0.08, [0.5, 0.5]).is_empty(), "poses are never exact");
-    }
-
-    #[test]
-    fn furniture_that_came_and_went_is_found() {
-        let changes = compare(&[SHELF], &[PALLET], 0.05, [0.5, 0.7]);
-        let find = |kind, x: f64, y: f64| {
-            changes.iter().find(|c| c.kind == kind && c.center.distance(&Point2::new(x, y)) < 0.6)
-        };
-        let came = find(ChangeKind::Appeared, 8.4, 0.9).unwrap();
-        assert!(came.high.x - came.low.x > 0.5 && came.confidence > 0.5, "{came:?}");
-        let went = find(ChangeKind::Disappeared, 6.0, 3.3).unwrap();
-        assert!(went.density_change.is_some_and(|change| (change - 0.2).abs() < 1e-6));
-        assert_eq!(changes.len(), 2, "{changes:?}");
-    }
-
-    #[test]
-    fn densities_of_the_wrong_sign_lower_the_confidence() {
-        let confidence = |densities| {
-            let changes = compare(&[SHELF], &[], 0.0, densities);
-            assert_eq!(changes.len(), 1);
-            changes[0].confidence
-        };
-        assert!(confidence([0.7, 0.5]) < 0.6 * confidence([0.5, 0.7]));
-    }
-
-    #[test]
-    fn impossible_settings_name_the_field() {
-        let config = ChangesConfig { free_share_max: f64::NAN, ..ChangesConfig::default() };
-        assert_eq!(find_changes(&[], &[], &config).unwrap_err().field, "changes.free_share_max");
-    }
-}
+mod tests;
