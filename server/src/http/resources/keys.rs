@@ -30,11 +30,13 @@ pub struct NewKeyDto {
     #[schema(example = json!(["office"]))]
     pub sites: Vec<String>,
     /// How long it is valid, seconds; for good unless said.
+    #[schema(minimum = 1, maximum = 315_360_000)]
+    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub expires_in_s: Option<u64>,
     /// Most requests in a second, on average.
     pub requests_per_s_max: Option<f64>,
     /// Most localisations at once.
-    #[serde(rename = "num_localisations_max")]
+    #[serde(rename = "num_localisations_max", default, deserialize_with = "crate::http::whole::optional")]
     pub num_localizations_max: Option<usize>,
 }
 
@@ -86,6 +88,7 @@ pub struct KeysDto {
 #[serde(deny_unknown_fields)]
 pub struct RotateParams {
     /// How long the old secret stays valid beside the new one, seconds; not at all unless said.
+    #[param(maximum = 315_360_000)]
     pub grace_s: Option<u64>,
 }
 
@@ -187,7 +190,10 @@ pub async fn rotate_key(
     Params(params): Params<RotateParams>,
 ) -> Result<Json<IssuedKeyDto>, ApiError> {
     check_alone(&state)?;
-    let grace_s = params.grace_s.unwrap_or(0).min(LIFE_MAX_S);
+    let grace_s = params.grace_s.unwrap_or(0);
+    if grace_s > LIFE_MAX_S {
+        return Err(ApiError::invalid("grace_s", format!("at most {LIFE_MAX_S} seconds")));
+    }
     let by = identity.clone();
     let (record, secret) = on_blocking_thread(move || state.gate.keys.rotate(&by, &name, grace_s)).await??;
     tracing::info!(target: "locution::audit", event = "key rotated", name = record.key.name, by = %identity.name());

@@ -29,7 +29,11 @@ pub struct GeometryDto {
     pub num_ranges: usize,
     /// Fewest readings of a scan, of a laser whose number varies; those missing at the end say nothing. As many as
     /// `num_ranges` unless said.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(
+        default,
+        skip_serializing_if = "Option::is_none",
+        deserialize_with = "crate::http::whole::optional"
+    )]
     #[schema(example = 180, minimum = 1)]
     pub num_ranges_min: Option<usize>,
     /// Direction of the first beam in the laser's frame.

@@ -283,10 +283,24 @@ pub async fn make_site(
 }
 
 fn parse_config(config: serde_json::Value) -> Result<EngineConfig, ApiError> {
+    let model = serde_json::to_value(EngineConfig::default()).map_err(AppError::internal)?;
+    if let Some(field) = section_that_is_none(&config, &model, "config") {
+        return Err(ApiError::malformed(format!("{field}: expected an object")).at(field));
+    }
     serde_path_to_error::deserialize(config).map_err(|error| {
         let field = format!("config.{}", error.path());
         ApiError::malformed(format!("{field}: {}", plain(&error.inner().to_string()))).at(field)
     })
+}
+
+/// The path of a section of the configuration that is given as something else than an object. A list would be read as
+/// the section's members in their order, which nobody means.
+fn section_that_is_none(given: &serde_json::Value, model: &serde_json::Value, path: &str) -> Option<String> {
+    let sections = model.as_object()?;
+    let Some(given) = given.as_object() else { return Some(path.to_owned()) };
+    given
+        .iter()
+        .find_map(|(name, value)| section_that_is_none(value, sections.get(name)?, &format!("{path}.{name}")))
 }
 
 /// All sites that the key may see.
