@@ -13,8 +13,9 @@ const NUM_POSITIONS_MAX: usize = 1000;
 const FARTHEST_M: f64 = 1e7;
 
 /// A shape in metres.
+// Other members are passed over, as GeoJSON wants it: programs add a `bbox` or more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "type", deny_unknown_fields)]
+#[serde(tag = "type")]
 pub enum ShapeDto {
     /// A position.
     Point {
@@ -197,7 +198,10 @@ mod tests {
         assert!(problem(open).contains("geometry.coordinates[0]"));
         let many = serde_json::json!({"type": "LineString", "coordinates": vec![[0, 0]; 1001]});
         assert!(problem(many).contains("1000"));
-        let unknown = serde_json::json!({"type": "Point", "coordinates": [0, 0], "bbox": []});
-        assert!(serde_json::from_value::<ShapeDto>(unknown).is_err());
+        let with_more = serde_json::json!({"type": "Point", "coordinates": [0, 0], "bbox": []});
+        assert_eq!(
+            serde_json::from_value::<ShapeDto>(with_more).unwrap(),
+            ShapeDto::Point { coordinates: [0.0; 2] }
+        );
     }
 }
