@@ -18,6 +18,7 @@ use crate::http::geojson::{
     CollectionTypeDto, FeatureCollectionDto, FeatureDto, FeatureKindDto, FeaturePropertiesDto,
     FeatureTypeDto, ShapeDto,
 };
+use crate::records::Shape;
 use crate::http::values::{Page, PageParams, PointDto};
 
 /// What a room is by its shape.
@@ -164,8 +165,7 @@ fn features(
                 rooms: vec![door.rooms.0, door.rooms.1],
                 ..properties(FeatureKindDto::Door, of.component)
             };
-            let coordinates = [door.position.x, door.position.y];
-            features.push(feature(ShapeDto::Point { coordinates }, said));
+            features.push(feature(ShapeDto::from(&Shape::Point(door.position)), said));
         }
     }
     for placed in drawn {
