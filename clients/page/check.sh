@@ -44,5 +44,5 @@ diff -rq "$work/built" server/assets/ui || {
 
 step "a browser clicks through it"
 (cd "$work/clients/page" && PAGE_PROGRAM=$program PAGE_BROWSER=$browser PAGE_PICTURES=$pictures \
-    PAGE_WORLD=$OLDPWD/clients/cli/worlds/office.yaml timeout 600 node --test --test-concurrency=1 test/page.test.mjs)
+    PAGE_WORLD=$OLDPWD/clients/cli/worlds/office.yaml timeout 300 node --test --test-concurrency=1 test/*.test.mjs)
 step "done"

@@ -79,14 +79,6 @@ export async function refusalOf(answer: Response): Promise<Refused> {
   }
 }
 
-let routes: Promise<Record<string, Record<string, unknown>>> | undefined;
-
-/** Whether this server has a route; its document says so. */
-export async function hasRoute(path: string, method: string): Promise<boolean> {
-  routes ??= getJson<{ paths: Record<string, Record<string, unknown>> }>("/openapi.json", {}).then(({ paths }) => paths);
-  return method in ((await routes)[path] ?? {});
-}
-
 /** The path of a site, and of what is below it. */
 export function sitePath(site: string, ...rest: string[]): string {
   return ["/v1/sites", encodeURIComponent(site), ...rest.map(encodeURIComponent)].join("/");

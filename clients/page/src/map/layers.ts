@@ -241,6 +241,7 @@ export interface Area {
   note: string;
   color: string;
   outline: Point[];
+  holes: Point[][];
   center: Point;
 }
 
@@ -250,11 +251,13 @@ export function areasLayer(areas: Area[]): Layer {
       const { context } = drawing;
       for (const area of areas) {
         context.beginPath();
-        for (const point of area.outline) context.lineTo(drawing.px(point.x), drawing.py(point.y));
-        context.closePath();
+        for (const ring of [area.outline, ...area.holes]) {
+          ring.forEach((point, i) => context[i ? "lineTo" : "moveTo"](drawing.px(point.x), drawing.py(point.y)));
+          context.closePath();
+        }
         context.fillStyle = area.color;
         context.globalAlpha = drawing.isDark ? 0.3 : 0.24;
-        context.fill();
+        context.fill("evenodd");
         context.globalAlpha = 1;
         context.strokeStyle = area.color;
         context.lineWidth = 1.5;
@@ -263,7 +266,7 @@ export function areasLayer(areas: Area[]): Layer {
       if (drawing.camera.scale > 8) for (const area of areas) drawText(drawing, area.center, area.name, 0, true);
     },
     pick(point, radius_m) {
-      const area = areas.find(({ outline }) => isInside(point, outline));
+      const area = areas.find(({ outline, holes }) => isInside(point, outline) && !holes.some((hole) => isInside(point, hole)));
       return area && { hit: { kind: "note", text: `${area.name}: ${area.note}` }, distance_m: 1.8 * radius_m };
     },
   };
@@ -277,6 +280,14 @@ function isInside(point: Point, outline: Point[]): boolean {
     if (crosses && point.x < ((b.x - a.x) * (point.y - a.y)) / (b.y - a.y) + a.x) inside = !inside;
   });
   return inside;
+}
+
+export function doorsLayer(doors: Point[]): Layer {
+  return {
+    draw(drawing) {
+      for (const door of doors) drawDisc(drawing, door, drawing.isDark ? "#ffffff" : "#23272f", 3.5);
+    },
+  };
 }
 
 export function roomColor(idx: number): string {
