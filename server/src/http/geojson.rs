@@ -62,9 +62,7 @@ impl ShapeDto {
     pub fn check(&self) -> Result<Shape, ApiError> {
         let shape = match self {
             Self::Point(coordinates) => Shape::Point(position("geometry.coordinates", coordinates)?),
-            Self::LineString(coordinates) => {
-                Shape::Line(positions("geometry.coordinates", coordinates, 2)?)
-            }
+            Self::LineString(coordinates) => Shape::Line(positions("geometry.coordinates", coordinates, 2)?),
             Self::Polygon(coordinates) => {
                 if coordinates.is_empty() {
                     return Err(ApiError::invalid("geometry.coordinates", "a polygon has an outer border"));

@@ -25,7 +25,8 @@ pub fn pairs_of(backup: &[u8]) -> Vec<Pair> {
         let mut block = block;
         while kind == b'D' && !block.is_empty() {
             let (lens, content) = block.split_at(8);
-            let len = |at: usize| u32::from_le_bytes([lens[at], lens[at + 1], lens[at + 2], lens[at + 3]]) as usize;
+            let len =
+                |at: usize| u32::from_le_bytes([lens[at], lens[at + 1], lens[at + 2], lens[at + 3]]) as usize;
             let (key, content) = content.split_at(len(0));
             let (value, content) = content.split_at(len(4));
             pairs.push(Pair { key: key.to_vec(), value: value.to_vec() });

@@ -113,7 +113,7 @@ fn cbor() {
 fn seeds_are_taken() {
     let filled = Filled::new();
     for request in requests() {
-            let headers = [("content-type", "application/json")];
+        let headers = [("content-type", "application/json")];
         let sent = filled.api.send(request.method.clone(), request.path, &headers, request.seed.into());
         let answer = filled.runtime.block_on(sent).expect("an answer");
         assert!(answer.status.is_success(), "{}: {}", request.path, answer.text());
@@ -123,7 +123,7 @@ fn seeds_are_taken() {
 #[test]
 fn keys_and_queries() {
     check!().with_type::<(Vec<Edit>, Vec<Edit>)>().with_test_time(TEST_TIME).for_each(|(key, query)| {
-            // Heads that are too long are refused by the listener itself.
+        // Heads that are too long are refused by the listener itself.
         let short = |mut text: Vec<u8>| {
             text.truncate(1_000);
             text
@@ -136,7 +136,8 @@ fn keys_and_queries() {
             (vec![("authorization", key)], "/v1/sites".to_owned()),
             (vec![], format!("/v1/sites/office/labels?{query}")),
         ] {
-            let sender = if headers.is_empty() { FILLED.api.clone() } else { Api::new(FILLED.api.base.clone()) };
+            let sender =
+                if headers.is_empty() { FILLED.api.clone() } else { Api::new(FILLED.api.base.clone()) };
             // What no header or address can hold is refused before it is sent.
             if let Ok(answer) = FILLED.runtime.block_on(sender.send(Method::GET, &path, &headers, vec![])) {
                 is_an_answer(&answer);

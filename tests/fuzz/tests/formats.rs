@@ -2,8 +2,8 @@
 
 use bolero::check;
 use locution_engine::formats::{
-    CarmenOptions, GraphDocument, GraphTextError, parse_map_server_yaml, parse_pgm, parse_relations, parse_truth,
-    read_carmen_log, read_g2o, read_toro, truth_text, write_g2o, write_pgm, write_toro,
+    CarmenOptions, GraphDocument, GraphTextError, parse_map_server_yaml, parse_pgm, parse_relations,
+    parse_truth, read_carmen_log, read_g2o, read_toro, truth_text, write_g2o, write_pgm, write_toro,
 };
 use locution_engine::geometry::Pose2;
 use locution_engine::pose_graph::{PoseGraphConfig, optimize};
@@ -47,7 +47,8 @@ fn comes_back(
             assert_eq!(write(&again), written);
             let mut graph = again.graph;
             if optimize(&mut graph, &PoseGraphConfig::default()).is_ok() {
-                let is_finite = |pose: &Pose2| [pose.x, pose.y, pose.theta].iter().all(|number| number.is_finite());
+                let is_finite =
+                    |pose: &Pose2| [pose.x, pose.y, pose.theta].iter().all(|number| number.is_finite());
                 assert!(graph.poses().iter().all(is_finite), "optimized to nothing\n{written}");
             }
         }
@@ -82,7 +83,8 @@ fn map_server_yaml() {
 
 #[test]
 fn pgm() {
-    let seeds: [&[u8]; 2] = [include_bytes!("../seeds/pgm/text.pgm"), include_bytes!("../seeds/pgm/bytes.pgm")];
+    let seeds: [&[u8]; 2] =
+        [include_bytes!("../seeds/pgm/text.pgm"), include_bytes!("../seeds/pgm/bytes.pgm")];
     check!().with_type::<(bool, Vec<Edit>)>().with_test_time(TEST_TIME).for_each(|(is_binary, edits)| {
         let Ok(image) = parse_pgm(&edited(seeds[usize::from(*is_binary)], edits)) else { return };
         assert_eq!(parse_pgm(&write_pgm(&image)).as_ref(), Ok(&image));

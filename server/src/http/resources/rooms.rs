@@ -18,8 +18,8 @@ use crate::http::geojson::{
     CollectionTypeDto, FeatureCollectionDto, FeatureDto, FeatureKindDto, FeaturePropertiesDto,
     FeatureTypeDto, ShapeDto,
 };
-use crate::records::Shape;
 use crate::http::values::{Page, PageParams, PointDto};
+use crate::records::Shape;
 
 /// What a room is by its shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
