@@ -129,6 +129,10 @@ class SiteMap:
         """All trajectories of a part of the map in TUM's format."""
         return self._form(routes.GET_MAP_TUM, component, "text/plain").decode()
 
+    def mcap(self, component: int = 0) -> bytes:
+        """Grid and trajectories of a part of the map as MCAP, for Foxglove."""
+        return self._form(routes.GET_MAP_MCAP, component, "application/octet-stream")
+
     def trajectory(self, run: str) -> Trajectory:
         """Where a run was in this map."""
         query: dict[str, Any] = {"frame": "map", "version": self.version}
