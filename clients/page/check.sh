@@ -43,6 +43,6 @@ diff -rq "$work/built" server/assets/ui || {
 }
 
 step "a browser clicks through it"
-(cd "$work/clients/page" && PAGE_PROGRAM=$program PAGE_BROWSER=$browser PAGE_PICTURES=$pictures \
+(cd "$work/clients/page" && PAGE_PROGRAM=$program PAGE_BROWSER=$browser PAGE_PICTURES=$pictures PAGE_BUILT=$work/built/ \
     PAGE_WORLD=$OLDPWD/clients/cli/worlds/office.yaml timeout 300 node --test --test-concurrency=1 test/*.test.mjs)
 step "done"

@@ -321,6 +321,37 @@ test("a run that is driven is watched as it grows", async () => {
   await assertAccessible(page, "run");
 });
 
+test("a job is cancelled, and a run is deleted with the next map", async () => {
+  await visit("#/sites/office/jobs");
+  await page.locator("h1").getByText("Jobs").waitFor();
+  // Most of a build of this size is over before a hand could cancel it, so it is held back until it is cancelled.
+  const held = [{ id: "900", kind: "build", state: "running", progress: 0.4, left_s: 12, detail: "registering" }];
+  let cancelled = "";
+  await page.route("**/jobs?*", (route) => route.fulfill({ json: { items: cancelled ? [{ ...held[0], state: "cancelled", detail: "cancelled" }] : held, next_cursor: null } }));
+  await page.route("**/jobs/900", (route) => {
+    cancelled = route.request().method();
+    return route.fulfill({ json: { ...held[0], state: "cancelled" } });
+  });
+  await page.getByText("40 % · registering · about 12 s left").waitFor();
+  await assertAccessible(page, "jobs");
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await page.locator(".state.cancelled").waitFor();
+  assert.equal(cancelled, "DELETE");
+  await page.unroute("**/jobs?*");
+  await page.unroute("**/jobs/900");
+  const before = (await ask(server.direct, "/v1/sites/office/map")).version;
+  await visit("#/sites/office/runs/cleaner");
+  await page.getByRole("button", { name: "Delete this run…" }).click();
+  await page.getByRole("dialog").getByLabel(/Type cleaner/).fill("cleaner");
+  await page.getByRole("button", { name: "Delete it" }).click();
+  await heading("Runs").waitFor();
+  await page.locator(".item").filter({ hasText: "cleaner" }).waitFor({ state: "detached" });
+  await until(async () => {
+    const map = await ask(server.direct, "/v1/sites/office/map");
+    return map.version > before && map.runs.every(({ run }) => run !== "cleaner");
+  }, "a map without the run");
+});
+
 test("a phone shows every view, and two fingers zoom", async () => {
   const phone = await chrome.open(PHONE);
   for (const view of ["", "sites/office/map", "sites/office/runs", "sites/office/matches", "sites/office/matches/0", "sites/office/ask", "sites/office/localize", "sites/office/versions", "sites/office/jobs", "sites/office/manage"]) {
