@@ -2,7 +2,7 @@
 # Shows that the page is what it is said to be, before a real server:
 #   its types are right · the files in the binary are those that its sources make · a browser clicks through all of it.
 # Takes about two and a half minutes on two busy cores.
-usage: bash clients/page/check.sh [PROGRAM] [PICTURES]
+# usage: bash clients/page/check.sh [PROGRAM] [PICTURES]
 #   PROGRAM   the built `locution`; target/release/locution unless said
 #   PICTURES  a folder for the README's pictures; none are taken unless said
 set -euo pipefail
