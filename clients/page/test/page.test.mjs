@@ -174,6 +174,20 @@ test("all layers are shown and explained", async () => {
   await assertAccessible(page, "map");
 });
 
+test("a map is taken along for nav2, its picture under the name that its YAML says", async () => {
+  await visit("#/sites/office/map");
+  const saved = async (title) => {
+    const [file] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: title }).click()]);
+    return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+  };
+  const picture = await saved("Grid for map_server (PGM)");
+  const about = await saved("Its YAML");
+  assert.equal(/^image: (.*)$/m.exec(about.bytes.toString())[1], picture.name);
+  assert.equal(picture.bytes.subarray(0, 2).toString(), "P5");
+  const rooms = JSON.parse((await saved("Rooms and doors (GeoJSON)")).bytes.toString());
+  assert.equal(rooms.type, "FeatureCollection");
+});
+
 test("a word that is clicked asks where else it reads like this", async () => {
   await visit("#/sites/office/map?layers=walls,words&at=30,17,40");
   const drive = await ask(server.direct, "/v1/sites/office/runs/porter/trajectory?frame=map");
