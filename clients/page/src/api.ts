@@ -85,11 +85,11 @@ export function sitePath(site: string, ...rest: string[]): string {
 }
 
 /** Saves an answer as a file; a plain link could not carry the key. */
-export async function save(path: string, name: string): Promise<void> {
+export async function save(path: string, name: string, edit?: (text: string) => string): Promise<void> {
   const answer = await fetchWithKey(path);
   if (!answer.ok) throw await refusalOf(answer);
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(await answer.blob());
+  link.href = URL.createObjectURL(edit ? new Blob([edit(await answer.text())]) : await answer.blob());
   link.download = name;
   link.click();
   window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

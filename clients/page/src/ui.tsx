@@ -230,7 +230,7 @@ export const percent = (value: number) => {
 /** A probability, which is never certain. */
 export const probability = (value: number) => (value >= 0.9995 ? "> 99.9 %" : value < 0.001 ? "< 0.1 %" : percent(value));
 export const metres = (value: number) =>
-  Math.abs(value) >= 100 ? `${count(Math.round(value))} m` : Math.abs(value) >= 1 ? `${value.toFixed(1)} m` : `${(100 * value).toFixed(1)} cm`;
+  Math.abs(value) >= 100 ? `${count(Math.round(value))} m` : Math.abs(value) >= 1 ? `${value.toFixed(1)} m` : value === 0 ? "0 m" : `${(100 * value).toFixed(1)} cm`;
 export const degrees = (angle_rad: number) => `${((180 / Math.PI) * angle_rad).toFixed(Math.abs(angle_rad) < 0.17 ? 1 : 0)}°`;
 export const bytes = (value: number) => (value < 1e6 ? `${Math.ceil(value / 1e3)} kB` : `${(value / 1e6).toFixed(1)} MB`);
 /** One thing or several. */

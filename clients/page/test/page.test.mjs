@@ -174,6 +174,20 @@ test("all layers are shown and explained", async () => {
   await assertAccessible(page, "map");
 });
 
+test("a map is taken along for nav2, its picture under the name that its YAML says", async () => {
+  await visit("#/sites/office/map");
+  const saved = async (title) => {
+    const [file] = await Promise.all([page.waitForEvent("download"), page.getByRole("button", { name: title }).click()]);
+    return { name: file.suggestedFilename(), bytes: readFileSync(await file.path()) };
+  };
+  const picture = await saved("Grid for map_server (PGM)");
+  const about = await saved("Its YAML");
+  assert.equal(/^image: (.*)$/m.exec(about.bytes.toString())[1], picture.name);
+  assert.equal(picture.bytes.subarray(0, 2).toString(), "P5");
+  const rooms = JSON.parse((await saved("Rooms and doors (GeoJSON)")).bytes.toString());
+  assert.equal(rooms.type, "FeatureCollection");
+});
+
 test("a word that is clicked asks where else it reads like this", async () => {
   await visit("#/sites/office/map?layers=walls,words&at=30,17,40");
   const drive = await ask(server.direct, "/v1/sites/office/runs/porter/trajectory?frame=map");
@@ -319,6 +333,37 @@ test("a run that is driven is watched as it grows", async () => {
   await page.locator(".chip").first().waitFor();
   await picture(page, "run");
   await assertAccessible(page, "run");
+});
+
+test("a job is cancelled, and a run is deleted with the next map", async () => {
+  await visit("#/sites/office/jobs");
+  await page.locator("h1").getByText("Jobs").waitFor();
+  // Most of a build of this size is over before a hand could cancel it, so it is held back until it is cancelled.
+  const held = [{ id: "900", kind: "build", state: "running", progress: 0.4, left_s: 12, detail: "registering" }];
+  let cancelled = "";
+  await page.route("**/jobs?*", (route) => route.fulfill({ json: { items: cancelled ? [{ ...held[0], state: "cancelled", detail: "cancelled" }] : held, next_cursor: null } }));
+  await page.route("**/jobs/900", (route) => {
+    cancelled = route.request().method();
+    return route.fulfill({ json: { ...held[0], state: "cancelled" } });
+  });
+  await page.getByText("40 % · registering · about 12 s left").waitFor();
+  await assertAccessible(page, "jobs");
+  await page.getByRole("button", { name: "Cancel" }).click();
+  await page.locator(".state.cancelled").waitFor();
+  assert.equal(cancelled, "DELETE");
+  await page.unroute("**/jobs?*");
+  await page.unroute("**/jobs/900");
+  const before = (await ask(server.direct, "/v1/sites/office/map")).version;
+  await visit("#/sites/office/runs/cleaner");
+  await page.getByRole("button", { name: "Delete this run…" }).click();
+  await page.getByRole("dialog").getByLabel(/Type cleaner/).fill("cleaner");
+  await page.getByRole("button", { name: "Delete it" }).click();
+  await heading("Runs").waitFor();
+  await page.locator(".item").filter({ hasText: "cleaner" }).waitFor({ state: "detached" });
+  await until(async () => {
+    const map = await ask(server.direct, "/v1/sites/office/map");
+    return map.version > before && map.runs.every(({ run }) => run !== "cleaner");
+  }, "a map without the run");
 });
 
 test("a phone shows every view, and two fingers zoom", async () => {

@@ -128,24 +128,41 @@ export function matchesLayer(matches: PlacedMatch[], chosen: string | undefined)
   };
 }
 
+/** Most dashes of one kind of match; more would blur into a line, and take their time. */
+const DASHES_MAX = 1500;
+/** More matches of one kind than this are drawn thin. */
+const MATCHES_THIN = 500;
+
 function drawMatches(drawing: Drawing, name: string, group: PlacedMatch[]): void {
   const [state = "", channel = ""] = name.split(" ");
   const { context } = drawing;
+  const shown = group.filter(({ earlier, later }) => drawing.isInView(earlier, later));
   context.strokeStyle = STATE_COLORS[state] ?? "#888888";
   context.fillStyle = context.strokeStyle;
   context.globalAlpha = state === "rejected" ? 0.55 : 0.9;
-  context.lineWidth = 1.5;
-  context.setLineDash(CHANNEL_DASHES[channel] ?? []);
-  context.beginPath();
-  for (const { earlier, later } of group) {
-    context.moveTo(drawing.px(earlier.x), drawing.py(earlier.y));
-    context.lineTo(drawing.px(later.x), drawing.py(later.y));
+  // Lines of a pixel are drawn the quick way.
+  context.lineWidth = shown.length > MATCHES_THIN ? 1 : 1.5;
+  const dashes = CHANNEL_DASHES[channel] ?? [];
+  const period = dashes.reduce((sum, part) => sum + part, 0);
+  // What is shorter than a dash and its gap is a dash.
+  const [dashed, solid] = [new Path2D(), new Path2D()];
+  let numDashes = 0;
+  for (const { earlier, later } of shown) {
+    const [x, y] = [drawing.px(earlier.x), drawing.py(earlier.y)];
+    const [toX, toY] = [drawing.px(later.x), drawing.py(later.y)];
+    const length = Math.min(Math.abs(toX - x) + Math.abs(toY - y), drawing.width + drawing.height);
+    const path = length > period && period > 0 ? dashed : solid;
+    if (path === dashed) numDashes += length / period;
+    path.moveTo(x, y);
+    path.lineTo(toX, toY);
   }
-  context.stroke();
+  context.stroke(solid);
+  context.setLineDash(numDashes < DASHES_MAX ? dashes : []);
+  context.stroke(dashed);
   context.setLineDash([]);
   // Both ends, so that a match shows that is shorter than a pixel.
   const size = drawing.camera.scale > 15 ? 5 : 3;
-  for (const { earlier, later } of group) {
+  for (const { earlier, later } of shown) {
     for (const end of [earlier, later]) {
       context.fillRect(drawing.px(end.x) - size / 2, drawing.py(end.y) - size / 2, size, size);
     }
@@ -195,6 +212,7 @@ export function labelsLayer(labels: Schemas["Label"][]): Layer {
     draw(drawing) {
       for (const label of labels) {
         const { x, y } = label.map_from_middle;
+        if (!drawing.isInView(label.map_from_middle, label.map_from_middle)) continue;
         drawDisc(drawing, { x, y }, LABEL_COLORS[label.label] ?? "#888888", 5.5);
         if (drawing.camera.scale > 14) drawText(drawing, { x, y }, label.label, 9);
       }

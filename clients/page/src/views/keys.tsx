@@ -136,7 +136,7 @@ const moment = (at_s: number) => new Date(1000 * at_s).toLocaleString("en", { da
 
 function NewKey({ isFirst, onIssued }: { isFirst: boolean; onIssued: (issued: Schemas["IssuedKey"]) => void }) {
   const [name, setName] = useState("");
-  const [chosenScope, setScope] = useState("write");
+  const [chosenScope, setScope] = useState<Schemas["NewKey"]["scope"]>("write");
   const [sites, setSites] = useState("*");
   const [lifetime_s, setLifetime] = useState("");
   const [rate, setRate] = useState("");
@@ -158,7 +158,7 @@ function NewKey({ isFirst, onIssued }: { isFirst: boolean; onIssued: (issued: Sc
       <h2>{isFirst ? "Make the first key" : "New key"}</h2>
       <div class="row top">
         <Field label="Name of the key" value={name} required maxLength={64} autocomplete="off" onInput={(event) => setName(event.currentTarget.value)} hint="who will use it; stands in the log" />
-        {!isFirst && <Choice label="It may" value={scope} options={SCOPES} onChange={setScope} />}
+        {!isFirst && <Choice label="It may" value={scope} options={SCOPES} onChange={(value) => setScope(SCOPES.find(([known]) => known === value)?.[0] ?? "read")} />}
       </div>
       {!isFirst && (
         <div class="row top">

@@ -125,6 +125,12 @@ function MapFigures() {
   const { site, map, component } = useSite();
   if (!map) return null;
   const { statistics } = map;
+  const prefix = `${site}-${map.version}-${component}-`;
+  const saved = (name: string) => {
+    // The YAML names its image, which lies beside it under the name that it was given here.
+    const edit = name === "grid.yaml" ? (text: string) => text.replace(/^image: .*$/m, `image: ${prefix}grid.pgm`) : undefined;
+    return save(`${sitePath(site)}/map/${name}?version=${map.version}&component=${component}`, prefix + name, edit);
+  };
   return (
     <>
       <h2>This version</h2>
@@ -143,7 +149,7 @@ function MapFigures() {
       <ul class="plainlist">
         {FORMS.map(([name, title]) => (
           <li key={name}>
-            <Act act={() => save(`${sitePath(site)}/map/${name}?version=${map.version}&component=${component}`, `${site}-${map.version}-${component}-${name}`)}>{title}</Act>
+            <Act act={() => saved(name)}>{title}</Act>
           </li>
         ))}
       </ul>
