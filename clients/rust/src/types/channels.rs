@@ -11,7 +11,7 @@ pub struct ChannelTarget {
 
 /// One move of a channel.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct MapChannelMove {
+pub struct ChannelMove {
     /// Where it points since.
     pub map_version: u64,
     /// When it was moved, seconds since 1970.
@@ -44,7 +44,7 @@ pub struct MapChannel {
     /// Where it goes when the last move is taken back.
     pub map_version_before: Option<u64>,
     /// The last moves, the newest first.
-    pub moves: Vec<MapChannelMove>,
+    pub moves: Vec<ChannelMove>,
     /// The map in the words of VDA 5050.
     pub vda5050: VdaMap,
 }

@@ -15,7 +15,7 @@ mod sites;
 mod texts;
 mod values;
 
-pub use channels::{ChannelRobot, ChannelTarget, MapChannel, MapChannelMove, RobotReport, VdaMap};
+pub use channels::{ChannelMove, ChannelRobot, ChannelTarget, MapChannel, RobotReport, VdaMap};
 pub use events::{Event, RunChange};
 pub use jobs::{Job, JobKind, JobState};
 pub use keys::{IssuedKey, Key, Keys, NewKey, Scope};
