@@ -62,6 +62,7 @@ export CHECK_JOB CHECK_SESSION
 ask POST /v1/keys '{"name": "scratch", "scope": "read", "sites": ["office"]}' >/dev/null
 ask PUT /v1/sites/office/runs/scratch "$geometry" >/dev/null
 ask PUT /v1/sites/scratch '{}' >/dev/null
+for channel in stable scratch; do ask PUT "/v1/sites/office/channels/$channel" '{}' >/dev/null; done
 
 step "a Python client, made and used"
 (cd "$work" && "$bin/openapi-python-client" generate --path "$OLDPWD/openapi/openapi.json" --meta none \

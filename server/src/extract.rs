@@ -21,7 +21,11 @@ use crate::state::AppState;
 /// Bodies above this are parsed on a blocking thread.
 const NUM_BYTES_PARSED_INLINE: usize = 64 << 10;
 
-/// A JSON or CBOR body; an empty one reads as `{}`.
+/// `null` in CBOR, and an object without members.
+const CBOR_NULL: &[u8] = &[0xf6];
+const CBOR_EMPTY: &[u8] = &[0xa0];
+
+/// A JSON or CBOR body; an empty one, and `null`, read as `{}`.
 pub struct Body<T>(pub T);
 
 impl<T: DeserializeOwned + Send + 'static> FromRequest<AppState> for Body<T> {
@@ -64,7 +68,9 @@ impl Format {
 
     fn parse<T: DeserializeOwned>(self, bytes: &[u8]) -> Result<T, ApiError> {
         match self {
-            Self::Json => parse_json(if bytes.is_empty() { b"{}" } else { bytes }),
+            Self::Json if bytes.trim_ascii().is_empty() || bytes.trim_ascii() == b"null" => parse_json(b"{}"),
+            Self::Json => parse_json(bytes),
+            Self::Cbor if bytes == CBOR_NULL => parse_cbor(CBOR_EMPTY),
             Self::Cbor => parse_cbor(bytes),
         }
         .map(|AsDocumented(value)| value)

@@ -224,6 +224,9 @@ pub async fn report_channel_robot(
     RobotName(robot): RobotName,
     Body(report): Body<RobotReportDto>,
 ) -> Result<StatusCode, ApiError> {
+    if report.map_version == 0 {
+        return Err(ApiError::invalid("map_version", "versions are numbered from 1"));
+    }
     let report = RobotReport { version: report.map_version, at_s: now_s() };
     note_robot(&site, &name, &robot, report).await?;
     Ok(StatusCode::NO_CONTENT)
