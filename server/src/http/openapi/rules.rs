@@ -47,6 +47,9 @@ pub(super) fn apply(document: &mut Node) {
             json_first(operation);
             add_refusals(path, method, operation);
             type_answers(operation);
+            if path.starts_with("/v1/queries/") {
+                name_silent_sites(operation);
+            }
         }
     }
     document.for_each_object(&mut bound_integer);
@@ -158,6 +161,18 @@ fn add_refusals(path: &str, method: &str, operation: &mut Node) {
     responses.sort_keys();
 }
 
+/// A question over all sites may be answered without some of them.
+fn name_silent_sites(operation: &mut Node) {
+    let answer = operation.get_mut("responses").and_then(|responses| responses.get_mut("200"));
+    let header = node!({
+        "description": "Sites that did not answer in time, with commas between; absent when all did",
+        "schema": {"type": "string"},
+    });
+    if let Some(answer) = answer.and_then(Node::members) {
+        answer.insert("headers".into(), node!({"Locution-Unanswered": header}));
+    }
+}
+
 /// Answers that are no text are bytes.
 fn type_answers(operation: &mut Node) {
     let responses = operation.get_mut("responses").and_then(Node::members);
@@ -227,10 +242,13 @@ mod tests {
     #[test]
     fn every_operation_gets_what_holds_for_all() {
         let mut document = node!({
-            "paths": {"/v1/sites/{site}": {"put": {
-                "requestBody": {"content": {"application/cbor": {}, "application/json": {}}},
-                "responses": {"201": {"description": "made"}, "409": {"description": "other"}},
-            }}},
+            "paths": {
+                "/v1/sites/{site}": {"put": {
+                    "requestBody": {"content": {"application/cbor": {}, "application/json": {}}},
+                    "responses": {"201": {"description": "made"}, "409": {"description": "other"}},
+                }},
+                "/v1/queries/words": {"post": {"responses": {"200": {"description": "found"}}}},
+            },
             "components": {"schemas": {"Pose": {"properties": {
                 "covariance": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
                 "count": {"type": "integer", "format": "u-int8"},
@@ -241,6 +259,8 @@ mod tests {
         let json = serde_json::to_value(&document).unwrap();
         let put = &json["paths"]["/v1/sites/{site}"]["put"];
         assert_eq!(put["parameters"][0]["name"], "site");
+        let everywhere = &json["paths"]["/v1/queries/words"]["post"]["responses"]["200"];
+        assert_eq!(everywhere["headers"]["Locution-Unanswered"]["schema"]["type"], "string");
         let statuses: Vec<&String> = put["responses"].as_object().unwrap().keys().collect();
         let expected =
             ["201", "400", "401", "403", "404", "408", "409", "413", "415", "422", "429", "500", "503"];
