@@ -3314,6 +3314,8 @@ export interface operations {
             /** @description An answer for each site, the likeliest first */
             200: {
                 headers: {
+                    /** @description Sites that did not answer in time, with commas between; absent when all did */
+                    "Locution-Unanswered"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -3348,6 +3350,8 @@ export interface operations {
             /** @description Where the labels are driven one after the other */
             200: {
                 headers: {
+                    /** @description Sites that did not answer in time, with commas between; absent when all did */
+                    "Locution-Unanswered"?: string;
                     [name: string]: unknown;
                 };
                 content: {
@@ -3382,6 +3386,8 @@ export interface operations {
             /** @description Where the words are driven, best fit first */
             200: {
                 headers: {
+                    /** @description Sites that did not answer in time, with commas between; absent when all did */
+                    "Locution-Unanswered"?: string;
                     [name: string]: unknown;
                 };
                 content: {
