@@ -244,6 +244,13 @@ pub struct RefinerConfig {
     pub lie_probability: f64,
     /// Probability that it stops to.
     pub recovery_probability: f64,
+    /// A run is cut when so many scans in a row leave the robot's place in doubt.
+    pub num_doubtful_scans: u32,
+    /// A fit with this share of returns on surfaces leaves no doubt.
+    pub sure_inlier_share: f64,
+    /// A lesser one does, whatever odometry says, when it sees through a larger share of what the scans before saw near
+    /// by.
+    pub max_seen_through: f64,
 }
 
 impl Default for RefinerConfig {
@@ -279,6 +286,9 @@ impl Default for RefinerConfig {
             sound_chi2: 12.0,
             lie_probability: 0.001,
             recovery_probability: 0.1,
+            num_doubtful_scans: 3,
+            sure_inlier_share: 0.5,
+            max_seen_through: 0.08,
         }
     }
 }
@@ -351,6 +361,12 @@ impl RefinerConfig {
         }
         if self.num_check_points == 0 {
             return Err(ConfigError::new(format!("{path}.num_check_points"), "must be positive"));
+        }
+        if self.num_doubtful_scans == 0 {
+            return Err(ConfigError::new(format!("{path}.num_doubtful_scans"), "must be positive"));
+        }
+        if !(0.0..=1.0).contains(&self.max_seen_through) {
+            return Err(ConfigError::new(format!("{path}.max_seen_through"), "must lie between 0 and 1"));
         }
         if self.range_limit_m > RANGE_LIMIT_MAX_M {
             let problem = format!("must be at most {RANGE_LIMIT_MAX_M}");

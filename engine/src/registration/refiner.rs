@@ -7,11 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use super::config::RefinerConfig;
 use super::correlative::{LikelihoodGrid, LocalWindow};
+use super::lost::{CutReason, Doubt, seen_through};
 use super::motion_prior::{MotionPrior, Witness};
 use super::odometry_record::OdometryRecord;
 use super::point_to_line::{Alignment, AlignmentSettings, align, linearize};
 use super::points::thinned_points;
 use super::recent_scan::RecentScan;
+use super::scan_clock::ScanClock;
 use super::surface_map::{FittedSurfaces, SurfaceMap};
 use crate::geometry::{Point2, Pose2};
 use crate::scan::{Scan, ScanGeometry};
@@ -19,10 +21,25 @@ use crate::scan::{Scan, ScanGeometry};
 /// What the refiner says of one scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
-    /// Pose in the run's own frame, which starts at the first odometry pose.
+    /// Pose in the run's own frame, which starts at the first odometry pose; after a cut in another one, which starts
+    /// at the odometry pose there.
     pub run_from_robot: Pose2,
     /// Present when the scan was registered: keep it as a keyframe.
     pub keyframe: Option<KeyframeMotion>,
+    /// Present when nothing tells how the robot came here from where the scans before were taken.
+    pub cut: Option<CutReason>,
+    /// True when the pose is a guess: the scan fits nothing, and the next ones will tell.
+    pub is_doubtful: bool,
+}
+
+/// What became of a scan.
+enum Advance {
+    /// The robot is here, counted from the start; with the motion if the scan makes a keyframe.
+    To(Pose2, Option<KeyframeMotion>),
+    /// The robot may be here.
+    Perhaps(Pose2),
+    /// Everything begins anew.
+    Anew(Option<CutReason>),
 }
 
 /// The motion that led to a keyframe.
@@ -32,8 +49,13 @@ pub struct KeyframeMotion {
     pub motion_covariance: [[f64; 3]; 3],
 }
 
-/// Time between scans of a robot without a clock, seconds.
-const UNTOLD_INTERVAL_S: f64 = 0.3;
+/// Odometry that says less from one scan to the next says that the robot stands, metres…
+const STILL_M: f64 = 0.01;
+/// … and radians.
+const STILL_RAD: f64 = 0.01;
+
+/// A recording that pauses for longer than this has a gap, seconds.
+const LONG_GAP_S: f64 = 2.0;
 
 /// Points that a surface must rest on.
 const MIN_COUNT: i32 = 3;
@@ -72,8 +94,11 @@ struct RefinerState {
     /// The latest registered scan, be it a keyframe or not.
     fixed: Option<Fixed>,
     record: OdometryRecord,
-    /// Usual time between scans, seconds; 0 while unknown.
-    interval_s: f64,
+    clock: ScanClock,
+    /// Set while it is doubted that the robot is where it is thought to be.
+    doubt: Option<Doubt>,
+    /// Scans in a row up to the latest that saw next to nothing.
+    num_blind: u32,
     /// Share of returns on surfaces that fits usually have.
     usual_share: f64,
     travel_mm: u64,
@@ -118,6 +143,8 @@ struct Expectation {
     is_by_odometry: bool,
     /// How odometry moved from the scan before.
     step: Pose2,
+    /// True when much more time went by than usual.
+    is_gap: bool,
 }
 
 /// A pose found for a scan.
@@ -126,6 +153,8 @@ struct Settled {
     /// Information of (x, y, θ), in the axes of the start.
     information: Matrix3<f64>,
     is_registered: bool,
+    /// Share of the returns that lie on surfaces.
+    inlier_share: f64,
 }
 
 impl OdometryRefiner {
@@ -138,7 +167,9 @@ impl OdometryRefiner {
             keyframe: None,
             fixed: None,
             record: OdometryRecord::default(),
-            interval_s: 0.0,
+            clock: ScanClock::default(),
+            doubt: None,
+            num_blind: 0,
             usual_share: 0.0,
             travel_mm: 0,
             recent: VecDeque::new(),
@@ -150,19 +181,28 @@ impl OdometryRefiner {
     ///
     /// As long as a few returns bear out what odometry says, a scan between keyframes is the latest registered one
     /// composed with odometry. Otherwise it is registered, and odometry counts for no more than one witness. A scan
-    /// that fits the recent scans badly keeps what was expected, with a covariance that says so.
+    /// that fits the recent scans badly keeps what was expected, with a covariance that says so; when that cannot be
+    /// either, and some more scans say the same, the run is cut.
     pub fn refine(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Refined {
-        let (start_from_robot, keyframe) = self.advance(geometry, scan);
-        Refined { run_from_robot: self.state.run_from_start.compose(&start_from_robot), keyframe }
+        let (start_from_robot, keyframe, cut, is_doubtful) = match self.advance(geometry, scan) {
+            Advance::To(pose, keyframe) => (pose, keyframe, None, false),
+            Advance::Perhaps(pose) => (pose, None, None, true),
+            Advance::Anew(cut) => {
+                self.start(geometry, scan);
+                let keyframe = KeyframeMotion { motion_covariance: [[0.0; 3]; 3] };
+                (Pose2::identity(), Some(keyframe), cut, false)
+            }
+        };
+        let run_from_robot = self.state.run_from_start.compose(&start_from_robot);
+        Refined { run_from_robot, keyframe, cut, is_doubtful }
     }
 
-    /// Pose of the next scan from where the run began, and the motion if it makes a keyframe.
-    fn advance(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<KeyframeMotion>) {
-        let Some(latest) = self.state.latest else { return self.start(geometry, scan) };
-        let gap_s = self.clock(scan.timestamp_ns, latest.timestamp_ns);
+    fn advance(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Advance {
+        let Some(latest) = self.state.latest else { return Advance::Anew(None) };
+        let gap_s = self.state.clock.gap_s(scan.timestamp_ns, latest.timestamp_ns);
         let expected = self.expect(&latest, scan, gap_s);
         let (Some(expected), Some(keyframe)) = (expected, self.state.keyframe) else {
-            return self.start(geometry, scan);
+            return Advance::Anew(None);
         };
         let config = &self.state.config;
         let is_due = |pose: &Pose2| {
@@ -171,12 +211,25 @@ impl OdometryRefiner {
                 || moved.theta.abs() >= config.keyframe_turn_rad
         };
         let was_due = is_due(&expected.predicted);
-        if expected.is_by_odometry && !was_due && self.bears_out(geometry, scan, &expected) {
+        if expected.is_by_odometry
+            && !was_due
+            && self.state.doubt.is_none()
+            && self.bears_out(geometry, scan, &expected)
+        {
             self.note(&latest, scan, &expected.step, expected.predicted);
-            return (expected.predicted, None);
+            return Advance::To(expected.predicted, None);
         }
         let points = self.points_of(geometry, scan);
         let settled = self.settle(&points, &expected, &latest);
+        if let Some(doubt) = self.doubt(geometry, scan, points.len(), &settled, &expected) {
+            if doubt.num_scans >= self.state.config.num_doubtful_scans {
+                return Advance::Anew(Some(doubt.reason));
+            }
+            self.state.doubt = Some(doubt);
+            self.note(&latest, scan, &expected.step, settled.start_from_robot);
+            return Advance::Perhaps(settled.start_from_robot);
+        }
+        self.state.doubt = None;
         let config = &self.state.config;
         let moved = keyframe.start_from_robot.between(&settled.start_from_robot);
         let is_keyframe = was_due
@@ -192,18 +245,22 @@ impl OdometryRefiner {
                     told: Pose2::identity(),
                 });
             }
-            return (settled.start_from_robot, None);
+            return Advance::To(settled.start_from_robot, None);
         }
         self.learn(&keyframe, &settled, &expected);
         self.state.travel_mm += (moved.x.hypot(moved.y) * 1000.0).round() as u64;
         self.keep(&points, settled.start_from_robot);
         let in_keyframe = rotated(&covariance, -keyframe.start_from_robot.theta);
         let motion = KeyframeMotion { motion_covariance: in_keyframe.transpose().into() };
-        (settled.start_from_robot, Some(motion))
+        Advance::To(settled.start_from_robot, Some(motion))
     }
 
-    fn start(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<KeyframeMotion>) {
+    /// Begins at a scan; what was learned of odometry and clock stays.
+    fn start(&mut self, geometry: &ScanGeometry, scan: &Scan) {
         let points = self.points_of(geometry, scan);
+        self.state.recent.clear();
+        self.surfaces = SurfaceMap::new(self.state.config.cell_m);
+        (self.state.doubt, self.state.num_blind) = (None, 0);
         self.state.run_from_start = scan.odom_from_robot;
         self.keep(&points, Pose2::identity());
         self.state.latest = Some(Latest {
@@ -213,28 +270,58 @@ impl OdometryRefiner {
             motion: Pose2::identity(),
             angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         });
-        (Pose2::identity(), Some(KeyframeMotion { motion_covariance: [[0.0; 3]; 3] }))
     }
 
-    /// Seconds since the scan before, as far as the clock can be believed; learns what is usual.
-    fn clock(&mut self, timestamp_ns: i64, before_ns: i64) -> f64 {
-        let gap_s = timestamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-        let usual_s = &mut self.state.interval_s;
-        if *usual_s <= 0.0 {
-            *usual_s = gap_s.clamp(0.0, 1.0);
-        } else {
-            *usual_s += 0.05 * (gap_s.clamp(0.0, 3.0 * *usual_s) - *usual_s);
+    /// The doubt that a scan leaves about where the robot is, if it does.
+    fn doubt(
+        &mut self,
+        geometry: &ScanGeometry,
+        scan: &Scan,
+        num_points: usize,
+        settled: &Settled,
+        expected: &Expectation,
+    ) -> Option<Doubt> {
+        let config = &self.state.config;
+        let before = self.state.doubt;
+        if num_points < config.min_points {
+            self.state.num_blind += 1;
+            // A robot that sees nothing goes by its odometry as long as there is one.
+            let untold =
+                (!expected.is_by_odometry).then_some(Doubt { reason: CutReason::NoReturns, num_scans: 0 });
+            return before.or(untold);
         }
-        // Clocks jitter: only a gap well beyond what is usual counts as one.
-        match *usual_s {
-            usual_s if usual_s <= 0.0 => UNTOLD_INTERVAL_S,
-            usual_s if gap_s > 3.0 * usual_s => gap_s,
-            usual_s => usual_s,
+        let was_blind = std::mem::take(&mut self.state.num_blind) > 0;
+        let num_scans = before.map_or(1, |doubt| doubt.num_scans + 1);
+        let is_still =
+            expected.step.x.hypot(expected.step.y) < STILL_M && expected.step.theta.abs() < STILL_RAD;
+        // Wheels that turn are on the floor: what they say is doubted only where something else is strange.
+        let suspicion = match before {
+            Some(doubt) => Some(doubt.reason),
+            None if expected.is_gap => Some(CutReason::Gap),
+            None if expected.odometry.is_none() => Some(CutReason::Jump),
+            None if was_blind => Some(CutReason::NoReturns),
+            None if is_still && expected.is_by_odometry => Some(CutReason::Carried),
+            None => None,
+        };
+        let unfollowed = !expected.is_by_odometry && !settled.is_registered;
+        let reason = suspicion.or(unfollowed.then_some(CutReason::Unfollowed))?;
+        // A robot that stands sees people come and go; after all else a scan that is to be believed fits well.
+        let is_standing = reason == CutReason::Carried;
+        let sure_share = if is_standing { config.sure_inlier_share } else { config.good_inlier_share };
+        if settled.inlier_share >= sure_share {
+            return None;
         }
+        // Odometry that says what a robot can do is believed as long as nothing that was there is gone.
+        let is_told = expected.is_by_odometry && !matches!(reason, CutReason::Jump | CutReason::Unfollowed);
+        let pose = &settled.start_from_robot;
+        let is_lost = !is_told
+            || seen_through(geometry, &scan.ranges_m, pose, self.state.recent.iter())
+                > config.max_seen_through;
+        is_lost.then_some(Doubt { reason, num_scans })
     }
 
     fn expect(&mut self, latest: &Latest, scan: &Scan, gap_s: f64) -> Option<Expectation> {
-        let interval_s = self.state.interval_s;
+        let interval_s = self.state.clock.usual_s();
         let config = &self.state.config;
         let step = latest.odom_from_robot.between(&scan.odom_from_robot);
         let is_possible = config.motion.is_possible(&step, gap_s, interval_s);
@@ -264,7 +351,8 @@ impl OdometryRefiner {
         let first = odometry.or(onward).unwrap_or_else(|| Witness::certain(predicted));
         let prior = MotionPrior::new(first, onward.filter(|_| odometry.is_some()));
         let odometry = odometry.filter(|_| is_possible);
-        Some(Expectation { predicted, prior, odometry, is_by_odometry, step })
+        let is_gap = gap_s > LONG_GAP_S.max(interval_s * 3.0);
+        Some(Expectation { predicted, prior, odometry, is_by_odometry, step, is_gap })
     }
 
     /// True when a few returns of a scan lie as they would if odometry were right.
@@ -277,6 +365,7 @@ impl OdometryRefiner {
             .map(|(_, point)| point)
             .collect();
         if points.len() < config.num_check_points / 4 {
+            self.state.num_blind += 1;
             return true;
         }
         let settings = alignment_settings(config);
@@ -291,7 +380,11 @@ impl OdometryRefiner {
         let share = f64::from(fit.num_inliers) / points.len() as f64;
         let step = (fit.hessian + odometry.information).try_inverse();
         let gain = step.map_or(0.0, |inverse| (fit.gradient.transpose() * inverse * fit.gradient)[0]);
-        gain < config.check_chi2 && share > config.check_share * self.state.usual_share
+        let is_right = gain < config.check_chi2 && share > config.check_share * self.state.usual_share;
+        if is_right {
+            self.state.num_blind = 0;
+        }
+        is_right
     }
 
     fn points_of(&self, geometry: &ScanGeometry, scan: &Scan) -> Vec<Point2> {
@@ -309,7 +402,12 @@ impl OdometryRefiner {
     fn settle(&mut self, points: &[Point2], expected: &Expectation, latest: &Latest) -> Settled {
         let Some(found) = self.register(points, expected, latest) else {
             let (information, _) = expected.prior.pull(&expected.predicted);
-            return Settled { start_from_robot: expected.predicted, information, is_registered: false };
+            return Settled {
+                start_from_robot: expected.predicted,
+                information,
+                is_registered: false,
+                inlier_share: 0.0,
+            };
         };
         let config = &self.state.config;
         if expected.odometry.is_some() {
@@ -323,6 +421,7 @@ impl OdometryRefiner {
             start_from_robot: found.map_from_points,
             information: found.information,
             is_registered: true,
+            inlier_share: found.inlier_share,
         }
     }
 

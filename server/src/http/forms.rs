@@ -237,7 +237,7 @@ pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
-        let poses = map_trajectories(&at.site, &at.map, at.component).await?;
+        let poses = map_trajectories(&at.map, at.component).await?;
         Ok(trajectory_as_tum(&poses).into_bytes())
     };
     at.answer("text/plain; charset=utf-8", body).await

@@ -31,7 +31,7 @@ mod stored_map;
 pub use annotation::{Annotation, Shape};
 pub use deletion::delete_prefixes;
 pub use keys::{Generation, Key, MapVersion, PartKind, RunIdx};
-pub use map::{Map, PlacedRun, Visit, append_places, append_rooms, match_chunks};
+pub use map::{Map, PlacedRun, RunPlaces, Visit, append_places, append_rooms, match_chunks};
 pub use pieces::{join_pieces, pieces};
 pub use reader::SiteReader;
 pub use run::Run;

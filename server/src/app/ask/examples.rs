@@ -74,8 +74,9 @@ pub struct ExampleInfo {
     pub map_version: u64,
     /// Metres that it drives.
     pub travel_m: f64,
-    /// The runs of the map, by their number.
-    pub runs: Vec<String>,
+    /// The runs of the map, or their pieces, by the number that the answer calls them, with the number of the first
+    /// observation.
+    pub runs: Vec<(String, u64)>,
     /// What is said of the recording.
     pub answer: ExampleAnswer,
 }
@@ -93,8 +94,7 @@ impl App {
         (geometry, readings): (&ScanGeometry, &ReadingRules),
         batch: NewBatch,
     ) -> Result<Vec<ExampleInfo>, AppError> {
-        let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = Arc::new(batch.checked((geometry, readings), 0, None, step_max_m)?);
+        let scans = Arc::new(batch.checked((geometry, readings), 0)?);
         let (mut answers, mut found_by_site) = (Vec::new(), Vec::new());
         let mut config = RecallConfig::default();
         for site in sites {
@@ -118,7 +118,7 @@ impl App {
                 site: site.name().to_string(),
                 map_version: map.record.version,
                 travel_m,
-                runs: map.record.runs.iter().map(|run| run.name.clone()).collect(),
+                runs: map.record.runs.iter().map(|run| (run.name.clone(), run.first_observation)).collect(),
                 answer: ExampleAnswer::default(),
             });
         }
@@ -189,7 +189,7 @@ async fn add_drive(
     mut builder: PlaceIndexBuilder,
 ) -> Result<PlaceIndexBuilder, AppError> {
     let run = map.reader().run(map_run.run).await?;
-    let observations = run.observations(0, map_run.num_labels as usize).await?;
+    let observations = run.observations(map_run.first_observation, map_run.num_labels as usize).await?;
     let trajectory = map.trajectory(map_run).await?;
     let component = map_run.component;
     on_blocking_thread(move || {

@@ -7,7 +7,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use locution_engine::geometry::Pose2;
 use locution_engine::locate::{
     LocalizationEstimate, LocalizationState, PosePrior, ServedMap, SessionMap, SiteSession,
 };
@@ -79,14 +78,12 @@ struct Session {
 struct Search {
     session: SiteSession,
     next_sequence: u64,
-    latest_odom: Option<Pose2>,
 }
 
 impl Search {
     fn push(&mut self, scans: &[Scan]) {
         scans.iter().for_each(|scan| self.session.push(scan));
         self.next_sequence += scans.len() as u64;
-        self.latest_odom = scans.last().map(|scan| scan.odom_from_robot).or(self.latest_odom);
     }
 }
 
@@ -167,13 +164,7 @@ impl App {
             return Err(AppError::Sequence { expected_sequence, detail });
         }
         let num_known = (expected_sequence - batch.first_sequence) as usize;
-        let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = batch.checked(
-            (&session.geometry, &session.readings),
-            num_known,
-            search.latest_odom,
-            step_max_m,
-        )?;
+        let scans = batch.checked((&session.geometry, &session.readings), num_known)?;
         let mut feeding = search.clone();
         *search = on_blocking_thread(move || {
             feeding.push(&scans);
@@ -247,7 +238,7 @@ impl App {
         let config = Arc::new(site.state().config.session());
         let session_map = SessionMap { components, index: self.place_index(site, map).await? };
         let session = SiteSession::new(geometry.clone(), config, session_map, prior);
-        Ok(Search { session, next_sequence: 0, latest_odom: None })
+        Ok(Search { session, next_sequence: 0 })
     }
 
     /// A component with the fields that localisation looks things up in.

@@ -33,18 +33,14 @@ pub struct NewBatch {
 }
 
 impl NewBatch {
-    /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
+    /// The scans after the first `num_known`, checked like those of a run.
     pub fn checked(
         mut self,
         (geometry, readings): (&ScanGeometry, &ReadingRules),
         num_known: usize,
-        before: Option<Pose2>,
-        step_max_m: f64,
     ) -> Result<Vec<Scan>, AppError> {
         check_readings(&mut self.scans, geometry, readings)?;
-        let num_known = num_known.min(self.scans.len());
-        check_odometry(&self.scans, num_known, before, step_max_m)?;
-        Ok(self.scans.split_off(num_known))
+        Ok(self.scans.split_off(num_known.min(self.scans.len())))
     }
 }
 
@@ -139,8 +135,6 @@ impl App {
             return Err(AppError::Finished { run: writer.record.name.clone(), expected_sequence });
         }
         check_has_odometry(&batch, state.head.value.last_odom_from_robot)?;
-        let step_max_m = self.config().limits.odometry_step_max_m;
-        check_odometry(&batch.scans, num_repeated, state.head.value.last_odom_from_robot, step_max_m)?;
         let fresh = batch.scans.split_off(num_repeated);
         let interval = self.config().storage.num_scans_per_checkpoint;
         let receipt = append_fresh(site, writer, state, fresh, interval).await?;
@@ -209,28 +203,6 @@ fn check_has_odometry(batch: &NewBatch, before: Option<Pose2>) -> Result<(), App
     if !batch.has_odometry && before.is_some_and(|before| before != Pose2::identity()) {
         let problem = "the scans of this run had odometry so far; all scans of a run have it or none";
         return Err(AppError::invalid_scan("scans[0].odom_from_robot", problem));
-    }
-    Ok(())
-}
-
-/// A robot that is elsewhere from one scan to the next has lost its odometry; no text can bridge that.
-fn check_odometry(
-    scans: &[Scan],
-    first_fresh: usize,
-    before: Option<Pose2>,
-    step_max_m: f64,
-) -> Result<(), AppError> {
-    let mut before = before;
-    for (scan_idx, scan) in scans.iter().enumerate().skip(first_fresh) {
-        let step_m = before.map_or(0.0, |before| before.distance(&scan.odom_from_robot));
-        if step_m > step_max_m {
-            let problem = format!(
-                "scan {scan_idx} lies {step_m:.1} m from the scan before it, more than the {step_max_m} m a robot \
-                 moves between scans; start a new run after a jump of the odometry"
-            );
-            return Err(AppError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot"), problem));
-        }
-        before = Some(scan.odom_from_robot);
     }
     Ok(())
 }
