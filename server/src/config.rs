@@ -90,6 +90,9 @@ pub struct LimitsConfig {
     pub num_ranges_per_scan_max: usize,
     /// Most runs in one site.
     pub num_runs_per_site_max: u32,
+    /// Farthest the odometry may move from one scan to the next, metres, when there was no time for more; what goes beyond
+    /// is a teleport and refused, but for odometry that begins at zero again.
+    pub odometry_step_max_m: f64,
     /// Most requests being served at once; more are refused with 503.
     pub num_requests_max: usize,
     /// Most batches and examples waiting or being worked on at once; more are refused with 429. A place is taken when
@@ -126,6 +129,7 @@ impl Default for LimitsConfig {
             num_scans_per_batch_max: 5_000,
             num_ranges_per_scan_max: 8_192,
             num_runs_per_site_max: 10_000,
+            odometry_step_max_m: 5.0,
             num_requests_max: 512,
             num_batches_max: 32,
             num_batches_per_run_max: 4,
@@ -330,6 +334,9 @@ impl ServerConfig {
         }
         self.storage.validate()?;
         self.cluster.validate(self)?;
+        if !(limits.odometry_step_max_m > 0.0 && limits.odometry_step_max_m.is_finite()) {
+            return invalid("limits.odometry_step_max_m", "must be a positive number of metres");
+        }
         if !(self.builds.settle_s >= 0.0 && self.builds.settle_s <= 86_400.0) {
             return invalid("builds.settle_s", "must lie between 0 and 86400 seconds");
         }

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config_error::ConfigError;
 use crate::geometry::Pose2;
+use crate::scan::ScanGeometry;
 
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -177,6 +178,9 @@ impl MotionLimits {
     }
 }
 
+/// Fewer returns than this fit anywhere.
+const NUM_POINTS_MIN: usize = 5;
+
 /// Points of the refiner's window are kept with 16 bits a coordinate, 2 mm each.
 const RANGE_LIMIT_MAX_M: f64 = 65.0;
 
@@ -198,7 +202,7 @@ pub struct RefinerConfig {
     pub point_spacing_m: f64,
     /// At most this many returns of a scan are used.
     pub max_points: usize,
-    /// Fewer returns than this are not registered.
+    /// Fewer returns than this are not registered; of a laser with few beams it is half of them.
     pub min_points: usize,
     /// Edge of a surface cell, metres.
     pub cell_m: f64,
@@ -322,6 +326,11 @@ impl SubmapConfig {
 }
 
 impl RefinerConfig {
+    /// Returns that a scan of this laser must have to be registered.
+    pub(super) fn min_points_of(&self, geometry: &ScanGeometry) -> usize {
+        self.min_points.min((geometry.num_ranges / 2).max(NUM_POINTS_MIN))
+    }
+
     /// Checks every value; `path` is this struct's own path.
     ///
     /// # Errors

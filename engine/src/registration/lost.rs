@@ -37,8 +37,10 @@ pub(super) struct Doubt {
     pub num_scans: u32,
 }
 
-/// Scans that are compared.
-const NUM_RECENT: usize = 3;
+/// The latest scans are compared that have together about so many points…
+const NUM_POINTS: usize = 300;
+/// … and at least so many.
+const NUM_SCANS_MIN: usize = 3;
 /// What lies farther off is not compared, for a little turn moves it far, metres.
 const REACH_M: f64 = 8.0;
 /// Seen through by less than this may be noise, metres.
@@ -56,7 +58,13 @@ pub(super) fn seen_through<'a>(
 ) -> f64 {
     let laser_from_start = start_from_robot.compose(&geometry.robot_from_laser).inverse();
     let (mut num_seen, mut num_through) = (0usize, 0usize);
-    for point in recent.rev().take(NUM_RECENT).flat_map(RecentScan::points) {
+    let mut num_compared = 0usize;
+    let compared = recent.rev().enumerate().take_while(|(idx, scan)| {
+        let is_wanted = *idx < NUM_SCANS_MIN || num_compared < NUM_POINTS;
+        num_compared += scan.points().count();
+        is_wanted
+    });
+    for point in compared.flat_map(|(_, scan)| scan.points()) {
         let at = laser_from_start.transform_point(&point);
         let distance_m = at.x.hypot(at.y);
         if distance_m > REACH_M {

@@ -54,6 +54,9 @@ const STILL_M: f64 = 0.01;
 /// … and radians.
 const STILL_RAD: f64 = 0.01;
 
+/// Scans from which on the surroundings are known well enough for a scan not to fit.
+const NUM_SCANS_KNOWN: usize = 5;
+
 /// A recording that pauses for longer than this has a gap, seconds.
 const LONG_GAP_S: f64 = 2.0;
 
@@ -141,6 +144,10 @@ struct Expectation {
     odometry: Option<Witness>,
     /// True when odometry is what is believed.
     is_by_odometry: bool,
+    /// True when there is odometry that a robot can have driven, be it believed or not.
+    is_told: bool,
+    /// Where the robot is if the scan does not tell.
+    untold: Pose2,
     /// How odometry moved from the scan before.
     step: Pose2,
     /// True when much more time went by than usual.
@@ -220,7 +227,8 @@ impl OdometryRefiner {
             return Advance::To(expected.predicted, None);
         }
         let points = self.points_of(geometry, scan);
-        let settled = self.settle(&points, &expected, &latest);
+        let min_points = self.state.config.min_points_of(geometry);
+        let settled = self.settle(min_points, &points, &expected, &latest);
         if let Some(doubt) = self.doubt(geometry, scan, points.len(), &settled, &expected) {
             if doubt.num_scans >= self.state.config.num_doubtful_scans {
                 return Advance::Anew(Some(doubt.reason));
@@ -283,11 +291,10 @@ impl OdometryRefiner {
     ) -> Option<Doubt> {
         let config = &self.state.config;
         let before = self.state.doubt;
-        if num_points < config.min_points {
+        if num_points < config.min_points_of(geometry) {
             self.state.num_blind += 1;
             // A robot that sees nothing goes by its odometry as long as there is one.
-            let untold =
-                (!expected.is_by_odometry).then_some(Doubt { reason: CutReason::NoReturns, num_scans: 0 });
+            let untold = (!expected.is_told).then_some(Doubt { reason: CutReason::NoReturns, num_scans: 0 });
             return before.or(untold);
         }
         let was_blind = std::mem::take(&mut self.state.num_blind) > 0;
@@ -303,7 +310,8 @@ impl OdometryRefiner {
             None if is_still && expected.is_by_odometry => Some(CutReason::Carried),
             None => None,
         };
-        let unfollowed = !expected.is_by_odometry && !settled.is_registered;
+        let is_known = self.state.recent.len() >= NUM_SCANS_KNOWN;
+        let unfollowed = !expected.is_told && !settled.is_registered && is_known;
         let reason = suspicion.or(unfollowed.then_some(CutReason::Unfollowed))?;
         // A robot that stands sees people come and go; after all else a scan that is to be believed fits well.
         let is_standing = reason == CutReason::Carried;
@@ -352,7 +360,9 @@ impl OdometryRefiner {
         let prior = MotionPrior::new(first, onward.filter(|_| odometry.is_some()));
         let odometry = odometry.filter(|_| is_possible);
         let is_gap = gap_s > LONG_GAP_S.max(interval_s * 3.0);
-        Some(Expectation { predicted, prior, odometry, is_by_odometry, step, is_gap })
+        let is_told = is_possible && !self.state.record.is_mute(&step);
+        let untold = if is_told { by_odometry } else { predicted };
+        Some(Expectation { predicted, prior, odometry, is_by_odometry, is_told, untold, step, is_gap })
     }
 
     /// True when a few returns of a scan lie as they would if odometry were right.
@@ -364,7 +374,7 @@ impl OdometryRefiner {
             .endpoints_of_every(stride, &scan.ranges_m, config.range_limit_m)
             .map(|(_, point)| point)
             .collect();
-        if points.len() < config.num_check_points / 4 {
+        if points.len() < config.min_points_of(geometry).min(config.num_check_points / 4) {
             self.state.num_blind += 1;
             return true;
         }
@@ -399,11 +409,17 @@ impl OdometryRefiner {
     }
 
     /// The pose of a scan, and what is then thought of the odometry.
-    fn settle(&mut self, points: &[Point2], expected: &Expectation, latest: &Latest) -> Settled {
-        let Some(found) = self.register(points, expected, latest) else {
-            let (information, _) = expected.prior.pull(&expected.predicted);
+    fn settle(
+        &mut self,
+        min_points: usize,
+        points: &[Point2],
+        expected: &Expectation,
+        latest: &Latest,
+    ) -> Settled {
+        let Some(found) = self.register(min_points, points, expected, latest) else {
+            let (information, _) = expected.prior.pull(&expected.untold);
             return Settled {
-                start_from_robot: expected.predicted,
+                start_from_robot: expected.untold,
                 information,
                 is_registered: false,
                 inlier_share: 0.0,
@@ -426,8 +442,14 @@ impl OdometryRefiner {
     }
 
     /// The best of the alignments from all the places where the robot may be; none when the fit is poor.
-    fn register(&mut self, points: &[Point2], expected: &Expectation, latest: &Latest) -> Option<Alignment> {
-        if points.len() < self.state.config.min_points {
+    fn register(
+        &mut self,
+        min_points: usize,
+        points: &[Point2],
+        expected: &Expectation,
+        latest: &Latest,
+    ) -> Option<Alignment> {
+        if points.len() < min_points {
             return None;
         }
         let mut best = self.align_from(&expected.predicted, points, expected);

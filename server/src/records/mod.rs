@@ -35,7 +35,7 @@ pub use map::{Map, PlacedRun, RunPlaces, Visit, append_places, append_rooms, mat
 pub use pieces::{join_pieces, pieces};
 pub use reader::SiteReader;
 pub use run::Run;
-pub use scans::{append_scans, find_receipt, is_same_scan, read_scans};
+pub use scans::{append_scans, find_receipt, is_same_scan, read_scans, read_stamps};
 pub use stored::{
     JobKind, JobRecord, JobState, ReadingRules, Receipt, Retention, RunHead, RunRecord, SiteRecord,
     StoredKeyframe, TextHead,

@@ -94,7 +94,8 @@ impl App {
         (geometry, readings): (&ScanGeometry, &ReadingRules),
         batch: NewBatch,
     ) -> Result<Vec<ExampleInfo>, AppError> {
-        let scans = Arc::new(batch.checked((geometry, readings), 0)?);
+        let step_max_m = self.config().limits.odometry_step_max_m;
+        let scans = Arc::new(batch.checked((geometry, readings), 0, None, step_max_m)?);
         let (mut answers, mut found_by_site) = (Vec::new(), Vec::new());
         let mut config = RecallConfig::default();
         for site in sites {
