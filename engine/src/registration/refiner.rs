@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::config::RefinerConfig;
 use super::correlative::{LikelihoodGrid, LocalWindow};
-use super::lost::{CutReason, Doubt, seen_through};
+use super::lost::{CutReason, Doubt};
 use super::motion_prior::{MotionPrior, Witness};
 use super::odometry_record::OdometryRecord;
 use super::point_to_line::{Alignment, AlignmentSettings, align, linearize};
@@ -17,6 +17,11 @@ use super::scan_clock::ScanClock;
 use super::surface_map::{FittedSurfaces, SurfaceMap};
 use crate::geometry::{Point2, Pose2};
 use crate::scan::{Scan, ScanGeometry};
+
+mod doubt;
+mod expectation;
+
+use expectation::Expectation;
 
 /// What the refiner says of one scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,17 +53,6 @@ pub struct KeyframeMotion {
     /// Covariance of the motion since the previous keyframe, (x, y, θ) in that keyframe's axes, row by row.
     pub motion_covariance: [[f64; 3]; 3],
 }
-
-/// Odometry that says less from one scan to the next says that the robot stands, metres…
-const STILL_M: f64 = 0.01;
-/// … and radians.
-const STILL_RAD: f64 = 0.01;
-
-/// Scans from which on the surroundings are known well enough for a scan not to fit.
-const NUM_SCANS_KNOWN: usize = 5;
-
-/// A recording that pauses for longer than this has a gap, seconds.
-const LONG_GAP_S: f64 = 2.0;
 
 /// Points that a surface must rest on.
 const MIN_COUNT: i32 = 3;
@@ -133,25 +127,6 @@ impl From<OdometryRefiner> for RefinerState {
     fn from(refiner: OdometryRefiner) -> Self {
         refiner.state
     }
-}
-
-/// What is expected of a scan before it is registered.
-struct Expectation {
-    /// The likeliest pose.
-    predicted: Pose2,
-    prior: MotionPrior,
-    /// What odometry says, with its covariance, when the robot could have moved so.
-    odometry: Option<Witness>,
-    /// True when odometry is what is believed.
-    is_by_odometry: bool,
-    /// True when there is odometry that a robot can have driven, be it believed or not.
-    is_told: bool,
-    /// Where the robot is if the scan does not tell.
-    untold: Pose2,
-    /// How odometry moved from the scan before.
-    step: Pose2,
-    /// True when much more time went by than usual.
-    is_gap: bool,
 }
 
 /// A pose found for a scan.
@@ -278,91 +253,6 @@ impl OdometryRefiner {
             motion: Pose2::identity(),
             angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         });
-    }
-
-    /// The doubt that a scan leaves about where the robot is, if it does.
-    fn doubt(
-        &mut self,
-        geometry: &ScanGeometry,
-        scan: &Scan,
-        num_points: usize,
-        settled: &Settled,
-        expected: &Expectation,
-    ) -> Option<Doubt> {
-        let config = &self.state.config;
-        let before = self.state.doubt;
-        if num_points < config.min_points_of(geometry) {
-            self.state.num_blind += 1;
-            // A robot that sees nothing goes by its odometry as long as there is one.
-            let untold = (!expected.is_told).then_some(Doubt { reason: CutReason::NoReturns, num_scans: 0 });
-            return before.or(untold);
-        }
-        let was_blind = std::mem::take(&mut self.state.num_blind) > 0;
-        let num_scans = before.map_or(1, |doubt| doubt.num_scans + 1);
-        let is_still =
-            expected.step.x.hypot(expected.step.y) < STILL_M && expected.step.theta.abs() < STILL_RAD;
-        // Wheels that turn are on the floor: what they say is doubted only where something else is strange.
-        let suspicion = match before {
-            Some(doubt) => Some(doubt.reason),
-            None if expected.is_gap => Some(CutReason::Gap),
-            None if expected.odometry.is_none() => Some(CutReason::Jump),
-            None if was_blind => Some(CutReason::NoReturns),
-            None if is_still && expected.is_by_odometry => Some(CutReason::Carried),
-            None => None,
-        };
-        let is_known = self.state.recent.len() >= NUM_SCANS_KNOWN;
-        let unfollowed = !expected.is_told && !settled.is_registered && is_known;
-        let reason = suspicion.or(unfollowed.then_some(CutReason::Unfollowed))?;
-        // A robot that stands sees people come and go; after all else a scan that is to be believed fits well.
-        let is_standing = reason == CutReason::Carried;
-        let sure_share = if is_standing { config.sure_inlier_share } else { config.good_inlier_share };
-        if settled.inlier_share >= sure_share {
-            return None;
-        }
-        // Odometry that says what a robot can do is believed as long as nothing that was there is gone.
-        let is_told = expected.is_by_odometry && !matches!(reason, CutReason::Jump | CutReason::Unfollowed);
-        let pose = &settled.start_from_robot;
-        let is_lost = !is_told
-            || seen_through(geometry, &scan.ranges_m, pose, self.state.recent.iter())
-                > config.max_seen_through;
-        is_lost.then_some(Doubt { reason, num_scans })
-    }
-
-    fn expect(&mut self, latest: &Latest, scan: &Scan, gap_s: f64) -> Option<Expectation> {
-        let interval_s = self.state.clock.usual_s();
-        let config = &self.state.config;
-        let step = latest.odom_from_robot.between(&scan.odom_from_robot);
-        let is_possible = config.motion.is_possible(&step, gap_s, interval_s);
-        let share = if interval_s > 0.0 { (gap_s / interval_s).min(10.0) } else { 1.0 };
-        let mut onward =
-            Pose2::new(latest.motion.x * share, latest.motion.y * share, latest.motion.theta * share);
-        let gyroscope = turn_by_gyroscope(latest, scan, gap_s);
-        onward.theta = gyroscope.unwrap_or(onward.theta);
-        // A step that cannot be is offered once, and never carried on.
-        let carried = if is_possible { step } else { onward };
-        let (fixed, keyframe) = (self.state.fixed.as_mut()?, self.state.keyframe.as_mut()?);
-        let told = fixed.told.compose(&step);
-        (fixed.told, keyframe.told) = (fixed.told.compose(&carried), keyframe.told.compose(&carried));
-        let fixed = *fixed;
-        let motion = self.state.record.corrected(&told);
-        let by_odometry = fixed.start_from_robot.compose(&motion);
-        let belief = if is_possible { self.state.record.belief(&step) } else { 0.05 };
-        let covariance =
-            fixed.covariance + rotated(&config.odometry.covariance(&motion), fixed.start_from_robot.theta);
-        let odometry = Witness::new(by_odometry, &covariance, belief);
-        let going_on = latest.start_from_robot.compose(&onward);
-        let covariance = fixed.covariance
-            + rotated(&config.motion.covariance(gap_s, gyroscope.is_some()), latest.start_from_robot.theta);
-        let onward = Witness::new(going_on, &covariance, (1.0 - belief).max(config.lie_probability));
-        let is_by_odometry = odometry.is_some() && belief > 0.5;
-        let predicted = if is_by_odometry { by_odometry } else { going_on };
-        let first = odometry.or(onward).unwrap_or_else(|| Witness::certain(predicted));
-        let prior = MotionPrior::new(first, onward.filter(|_| odometry.is_some()));
-        let odometry = odometry.filter(|_| is_possible);
-        let is_gap = gap_s > LONG_GAP_S.max(interval_s * 3.0);
-        let is_told = is_possible && !self.state.record.is_mute(&step);
-        let untold = if is_told { by_odometry } else { predicted };
-        Some(Expectation { predicted, prior, odometry, is_by_odometry, is_told, untold, step, is_gap })
     }
 
     /// True when a few returns of a scan lie as they would if odometry were right.
@@ -558,14 +448,6 @@ impl OdometryRefiner {
         }
         self.fitted.clear();
     }
-}
-
-/// How far the robot turned since the scan before by the rates that its gyroscope told at both.
-fn turn_by_gyroscope(latest: &Latest, scan: &Scan, gap_s: f64) -> Option<f64> {
-    let (before, now) = (latest.angular_velocity_rad_per_s?, scan.angular_velocity_rad_per_s?);
-    let turn = 0.5 * (before + now) * gap_s;
-    // Beyond a turn something else than the robot is told of.
-    (turn.abs() < std::f64::consts::TAU).then_some(turn)
 }
 
 fn alignment_settings(config: &RefinerConfig) -> AlignmentSettings {
