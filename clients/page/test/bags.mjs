@@ -64,6 +64,32 @@ function topics(isCdr) {
   ];
 }
 
+/** A CARMEN log of the simulator as what its robot would have recorded with ROS 2: odometry between the scans, by transforms. */
+export function mcapOfLog(log) {
+  const scans = [];
+  const transforms = [];
+  for (const line of log.split("\n")) {
+    const words = line.split(" ");
+    if (words[0] !== "ROBOTLASER1") continue;
+    const [min, field, increment, max, count] = [2, 3, 4, 5, 8].map((idx) => Number(words[idx]));
+    const ranges = words.slice(9, 9 + count).map(Number);
+    const rest = words.slice(9 + count);
+    // Remissions, the laser's pose, the robot's pose, five words of motion, the time.
+    const [x, y, theta] = rest.slice(4, 7).map(Number);
+    const timestamp_ns = Math.round(1e9 * (1 + Number(rest[12])));
+    const scan = new Writer(true).header(timestamp_ns, "laser");
+    for (const value of [min, min + field, increment, 0, 0.1, 0.05, max]) scan.f32(value);
+    scan.u32(count);
+    for (const range of ranges) scan.f32(range);
+    scans.push(scan.u32(0).end());
+    transforms.push(new Writer(true).u32(1).header(timestamp_ns, "odom").text("base_link").f64s(x, y, 0, 0, 0, Math.sin(theta / 2), Math.cos(theta / 2)).end());
+  }
+  return mcapFile([
+    ["/tf", "tf2_msgs/msg/TFMessage", transforms],
+    ["/scan", "sensor_msgs/msg/LaserScan", scans],
+  ]);
+}
+
 const u16 = (value) => Buffer.from(Uint16Array.of(value).buffer);
 const u32 = (value) => Buffer.from(Uint32Array.of(value).buffer);
 const u64 = (value) => Buffer.from(BigUint64Array.of(BigInt(value)).buffer);
@@ -71,10 +97,10 @@ const text = (content) => Buffer.concat([u32(Buffer.byteLength(content)), Buffer
 const joined = (...parts) => Buffer.concat(parts);
 
 /** An MCAP file without chunks and index. */
-export function mcapFile() {
+export function mcapFile(recorded = topics(true)) {
   const magic = Buffer.from("\x89MCAP0\r\n", "latin1");
   const record = (opcode, ...content) => joined(Buffer.of(opcode), u64(joined(...content).length), ...content);
-  const records = topics(true).flatMap(([topic, kind, messages], idx) => {
+  const records = recorded.flatMap(([topic, kind, messages], idx) => {
     const id = u16(idx + 1);
     return [
       record(3, id, text(kind), text("ros2msg"), text("")),

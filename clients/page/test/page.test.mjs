@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { after, before, test as nodeTest } from "node:test";
 import { copyFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
-import { mcapFile, rosbagFile } from "./bags.mjs";
+import { mcapFile, mcapOfLog, rosbagFile } from "./bags.mjs";
 import { ask, assertAccessible, assertFits, assertReadable, colorsOf, folder, join, picture, readFileSync, recording, run, startBrowser, startServer, until, writeFileSync } from "./surroundings.mjs";
 
 const world = process.env.PAGE_WORLD;
@@ -23,6 +23,7 @@ before(async () => {
     guest: recording("guest", world, "--wander", "30", "--seed", "5", "--start", "30,17"),
   };
   writeFileSync(join(folder, "cleaner.log.gz"), gzipSync(readFileSync(logs.cleaner)));
+  writeFileSync(join(folder, "guest.mcap"), mcapOfLog(readFileSync(logs.guest, "utf8")));
   server = await startServer();
   chrome = await startBrowser(server.url);
   page = await chrome.open();
@@ -274,7 +275,8 @@ test("places are asked for by what a person calls them", async () => {
 
 test("a recording is found in the map", async () => {
   await visit("#/sites/office/ask/example");
-  await page.getByLabel("Recording", { exact: true }).setInputFiles(logs.guest);
+  await page.getByLabel("Recording", { exact: true }).setInputFiles(join(folder, "guest.mcap"));
+  await page.getByText("/scan with odometry of tf").waitFor();
   await page.getByRole("button", { name: "Where was this recorded?" }).click();
   await page.getByText(/Found\.|Several places|Not here/).waitFor();
   await assertAccessible(page, "question by recording");
@@ -282,7 +284,7 @@ test("a recording is found in the map", async () => {
 
 test("a recording is localized while one watches", async () => {
   await visit("#/sites/office/localize");
-  await page.getByLabel("Recording", { exact: true }).setInputFiles(logs.guest);
+  await page.getByLabel("Recording", { exact: true }).setInputFiles(join(folder, "guest.mcap"));
   await page.getByLabel("Pace").selectOption("0");
   await page.getByRole("button", { name: "Drive" }).click();
   await page.locator(".state.converged").waitFor();
