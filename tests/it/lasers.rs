@@ -214,8 +214,8 @@ async fn a_robot_that_is_carried_has_a_run_in_pieces() {
     make(api, "r", &geometry()).await.ok();
     // It stops in the first corridor, is carried with its laser covered, and drives on in the second.
     let driven = drive(560, 4);
-    let mut scans = driven[..120].to_vec();
-    let stopped = scans[119].clone();
+    let mut scans = driven[..160].to_vec();
+    let stopped = scans[159].clone();
     for _ in 0..10 {
         let mut blind = stopped.clone();
         blind["ranges_m"].as_array_mut().unwrap().fill(Value::Null);
@@ -239,11 +239,11 @@ async fn a_robot_that_is_carried_has_a_run_in_pieces() {
     };
     let [(0, end, first), (start, last, reason)] = &told(&pieces)[..] else { panic!("{pieces}") };
     assert_eq!((end + 1, *last, first), (*start, scans.len() as u64 - 1, &Value::Null));
-    assert!((130..136).contains(start), "{pieces}");
+    assert!((170..176).contains(start), "{pieces}");
     assert!(reason == "jump" || reason == "no_returns", "{pieces}");
     assert!(pieces["items"].as_array().unwrap().iter().all(|piece| piece["component"].is_null()));
     api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
-    api.build("a").await;
+    api.post("/v1/sites/a/builds?wait=true", &json!({})).await.ok();
     // Both pieces are in the map, and what is served of the map says of each where it lies.
     let pieces = api.get("/v1/sites/a/runs/r/pieces").await.ok();
     let components: Vec<u64> = (pieces["items"].as_array().unwrap().iter())

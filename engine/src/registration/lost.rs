@@ -33,6 +33,8 @@ pub enum CutReason {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Doubt {
     pub reason: CutReason,
+    /// True when odometry cannot have brought it there.
+    pub is_elsewhere: bool,
     /// Scans so far that saw something and did not fit.
     pub num_scans: u32,
 }

@@ -8,7 +8,6 @@ use serde::{Deserialize, Serialize};
 use super::config::RefinerConfig;
 use super::correlative::{LikelihoodGrid, LocalWindow};
 use super::lost::{CutReason, Doubt};
-use super::motion_prior::{MotionPrior, Witness};
 use super::odometry_record::OdometryRecord;
 use super::point_to_line::{Alignment, AlignmentSettings, align, linearize};
 use super::points::thinned_points;

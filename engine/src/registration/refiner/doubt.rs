@@ -26,7 +26,11 @@ impl OdometryRefiner {
         if num_points < config.min_points_of(geometry) {
             self.state.num_blind += 1;
             // A robot that sees nothing goes by its odometry as long as there is one.
-            let untold = (!expected.is_told).then_some(Doubt { reason: CutReason::NoReturns, num_scans: 0 });
+            let untold = (!expected.is_told).then_some(Doubt {
+                reason: CutReason::NoReturns,
+                is_elsewhere: false,
+                num_scans: 0,
+            });
             return before.or(untold);
         }
         let was_blind = std::mem::take(&mut self.state.num_blind) > 0;
@@ -51,12 +55,16 @@ impl OdometryRefiner {
         if settled.inlier_share >= sure_share {
             return None;
         }
-        // Odometry that says what a robot can do is believed as long as nothing that was there is gone.
-        let is_told = expected.is_by_odometry && !matches!(reason, CutReason::Jump | CutReason::Unfollowed);
+        // A robot that turned too fast sees much that is new; one that is elsewhere at once sees nothing that can be believed.
+        let is_elsewhere = before.is_some_and(|doubt| doubt.is_elsewhere)
+            || (reason == CutReason::Jump && expected.is_far)
+            || reason == CutReason::Unfollowed;
+        // What fits a little and takes nothing away may be true, as may what a robot can have driven.
+        let may_be = !is_elsewhere && (expected.is_by_odometry || settled.is_registered);
         let pose = &settled.start_from_robot;
-        let is_lost = !is_told
+        let is_lost = !may_be
             || seen_through(geometry, &scan.ranges_m, pose, self.state.recent.iter())
                 > config.max_seen_through;
-        is_lost.then_some(Doubt { reason, num_scans })
+        is_lost.then_some(Doubt { reason, is_elsewhere, num_scans })
     }
 }

@@ -23,6 +23,8 @@ pub(super) struct Expectation {
     pub untold: Pose2,
     /// How odometry moved from the scan before.
     pub step: Pose2,
+    /// True when no robot drives so far in the time.
+    pub is_far: bool,
     /// True when much more time went by than usual.
     pub is_gap: bool,
 }
@@ -59,10 +61,21 @@ impl OdometryRefiner {
         let first = odometry.or(onward).unwrap_or_else(|| Witness::certain(predicted));
         let prior = MotionPrior::new(first, onward.filter(|_| odometry.is_some()));
         let odometry = odometry.filter(|_| is_possible);
+        let is_far = !config.motion.is_possible(&Pose2::new(step.x, step.y, 0.0), gap_s, interval_s);
         let is_gap = gap_s > LONG_GAP_S.max(interval_s * 3.0);
         let is_told = is_possible && !self.state.record.is_mute(&step);
         let untold = if is_told { by_odometry } else { predicted };
-        Some(Expectation { predicted, prior, odometry, is_by_odometry, is_told, untold, step, is_gap })
+        Some(Expectation {
+            predicted,
+            prior,
+            odometry,
+            is_by_odometry,
+            is_told,
+            untold,
+            step,
+            is_far,
+            is_gap,
+        })
     }
 }
 
