@@ -19,23 +19,22 @@ const NUM_PANELS_MAX: usize = 12;
 
 /// Head of every graph that is served.
 const GRAPH_HEAD: &str = "\
-# A vertex per keyframe, an edge per motion, and one per registration of verified matches; one FIX per component.
+# A vertex per keyframe, an edge per motion, and one per registration of verified matches; the first is held.
 # The vertices are where the map has them, which is not quite the optimum of these edges: the map weighs registrations
 # between submaps against each other, of which a match names the one that speaks for it, and shares out among the
 # keyframes in between. Solving these edges anew therefore moves vertices, by a few decimeters where few matches tie a run.
 ";
 
-/// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified matches, and
-/// one `FIX` per component. Comments say which run and scan each vertex is.
+/// The pose graph of a component in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified
+/// matches, the first vertex held. Comments say which run and scan each vertex is.
 ///
 /// # Errors
 /// Those of the storage; [`AppError::Internal`] for a graph that cannot be.
-pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, AppError> {
-    let runs = map.placed_runs(component).await?;
+pub async fn graph_as_g2o(map: &Map, component: u32) -> Result<String, AppError> {
+    let runs = map.placed_runs(Some(component)).await?;
     let mut graph = PoseGraph::new();
     // For each run or piece of one which keyframes of the run are vertices, and the number of the first.
     let mut vertices: Vec<(u32, std::ops::Range<u64>, u32)> = Vec::new();
-    let mut fixed = BTreeSet::new();
     let mut text = GRAPH_HEAD.to_owned();
     for placed in &runs {
         let first = graph.poses().len() as u32;
@@ -44,7 +43,7 @@ pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, A
             graph.add_pose(pose.map_from_robot).map_err(AppError::internal)?;
             text += &format!("# {vertex} run {} scan {}\n", placed.map_run.name, pose.scan_seq);
         }
-        if fixed.insert(placed.map_run.component) {
+        if first == 0 && !placed.poses.is_empty() {
             graph.hold(first).map_err(AppError::internal)?;
         }
         add_motions(&mut graph, first, placed).await?;
@@ -90,16 +89,24 @@ async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> R
     Ok(())
 }
 
-/// Poses of every scan of every run of a component, or of all, in the order of the runs.
-pub async fn map_trajectories(map: &Map, component: Option<u32>) -> Result<Vec<StampedPose>, AppError> {
-    let mut poses = Vec::new();
+/// Runs of a component, in their order, each with its pose at every scan of those of its pieces that lie there.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn ways_of_runs(map: &Map, component: u32) -> Result<Vec<(String, Vec<StampedPose>)>, AppError> {
+    let mut ways: Vec<(String, Vec<StampedPose>)> = Vec::new();
     for run in &map.record.runs {
-        if run.num_poses > 0 && component.is_none_or(|component| component == run.component) {
+        if run.num_poses > 0 && component == run.component {
             let stored = map.reader().run(run.run).await?;
-            poses.extend(trajectory_of(map, run, &stored).await?);
+            let way = trajectory_of(map, run, &stored).await?;
+            match ways.last_mut() {
+                // Another piece of the same run.
+                Some((name, poses)) if *name == run.name => poses.extend(way),
+                _ => ways.push((run.name.clone(), way)),
+            }
         }
     }
-    Ok(poses)
+    Ok(ways)
 }
 
 /// A covariance that cannot be inverted brings no edge: the graph is for looking at, not for trusting blindly.
