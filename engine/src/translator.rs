@@ -62,7 +62,7 @@ pub struct Translator {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 enum Odometry {
     /// As sent.
-    Raw(RawOdometry),
+    Raw(Box<RawOdometry>),
     /// Registered against the recent scans.
     Refined(Box<OdometryRefiner>),
 }
@@ -70,7 +70,7 @@ enum Odometry {
 impl Odometry {
     fn new(config: &TranslatorConfig) -> Self {
         match config.odometry {
-            OdometrySource::Raw => Self::Raw(RawOdometry::new(config)),
+            OdometrySource::Raw => Self::Raw(Box::new(RawOdometry::new(config))),
             OdometrySource::Refined => Self::Refined(Box::new(OdometryRefiner::new(&config.refiner))),
         }
     }
