@@ -17,7 +17,8 @@ use driven::{Driven, ring_world};
 /// Two robots in different halves of the ring, then two that go all round it.
 static RUNS: LazyLock<[Driven; 4]> = LazyLock::new(|| {
     let world = ring_world();
-    let (south, north) = ([(4.0, 2.0), (27.0, 2.0), (3.0, 2.0)], [(26.0, 18.0), (3.0, 18.0), (27.0, 18.0)]);
+    let south = [(2.0, 9.0), (2.0, 2.0), (28.0, 2.0), (28.0, 9.0), (28.0, 2.0), (2.0, 2.0)];
+    let north = [(28.0, 12.0), (28.0, 18.0), (2.0, 18.0), (2.0, 12.0), (2.0, 18.0), (28.0, 18.0)];
     let round = [(4.0, 2.0), (27.5, 2.0), (28.0, 18.0), (2.0, 18.0), (2.0, 2.0), (14.0, 2.0)];
     let other_way = [(25.0, 18.0), (28.0, 16.0), (28.0, 2.0), (2.0, 2.0), (2.0, 14.0)];
     [

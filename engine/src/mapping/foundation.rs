@@ -39,7 +39,9 @@ pub struct Foundation {
     /// Runs in the order of the site.
     runs: Vec<SettledRun>,
     bodies: Vec<Body>,
+    #[serde(with = "super::stored_matches")]
     matches: Vec<PlaceMatch>,
+    #[serde(with = "super::stored_matches")]
     refused: Vec<PlaceMatch>,
     null: Null,
 }

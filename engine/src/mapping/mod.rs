@@ -25,6 +25,7 @@ mod refusals;
 mod run;
 mod site_anchors;
 mod site_map;
+mod stored_matches;
 mod stretches;
 mod text_evidence;
 mod told;
