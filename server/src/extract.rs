@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use crate::app::site::Site;
 use crate::app::{AppError, Name};
 use crate::error::ApiError;
+use crate::http::as_documented::AsDocumented;
 use crate::http::values::{PageBounds, PageParams};
 use crate::http::wording::{located, of_cbor, plain};
 use crate::state::AppState;
@@ -66,6 +67,7 @@ impl Format {
             Self::Json => parse_json(if bytes.is_empty() { b"{}" } else { bytes }),
             Self::Cbor => parse_cbor(bytes),
         }
+        .map(|AsDocumented(value)| value)
     }
 }
 
@@ -162,6 +164,28 @@ impl FromRequestParts<AppState> for RunName {
 
     async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
         path_name(parts, state, "run").await.map(Self)
+    }
+}
+
+/// The name of a channel in the path, which need not exist.
+pub struct ChannelName(pub Name);
+
+impl FromRequestParts<AppState> for ChannelName {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
+        path_name(parts, state, "channel").await.map(Self)
+    }
+}
+
+/// The name of a robot in the path.
+pub struct RobotName(pub Name);
+
+impl FromRequestParts<AppState> for RobotName {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
+        path_name(parts, state, "robot").await.map(Self)
     }
 }
 

@@ -7,9 +7,11 @@ use super::node::{Members, Node, node};
 const GUARDED: [&str; 2] = ["/v1/", "/metrics"];
 
 /// Names that stand in paths: what they name, their form and longest length.
-const PATH_PARAMETERS: [(&str, &str, &str, usize); 4] = [
+const PATH_PARAMETERS: [(&str, &str, &str, usize); 6] = [
     ("site", "Name of the site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("run", "Name of the run in its site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
+    ("channel", "Name of the channel, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
+    ("robot", "Name of the robot, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("key", "Name of the key, chosen when it was made", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("id", "Its name, chosen by the server", r"^[0-9]+$", 19),
 ];
@@ -48,6 +50,7 @@ pub(super) fn apply(document: &mut Node) {
         }
     }
     document.for_each_object(&mut bound_integer);
+    document.for_each_object(&mut bound_size);
     document.for_each_object(&mut size_covariance);
     let responses =
         PROBLEMS.iter().map(|(status, name, meaning)| ((*name).to_owned(), problem(status, meaning)));
@@ -161,7 +164,8 @@ fn type_answers(operation: &mut Node) {
     for response in responses.into_iter().flat_map(|responses| responses.values_mut()) {
         let content = response.get_mut("content").and_then(Node::members);
         for (media_type, body) in content.into_iter().flatten() {
-            let is_binary = media_type.starts_with("image/") && media_type != "image/svg+xml";
+            let is_binary = media_type == "application/octet-stream"
+                || media_type.starts_with("image/") && media_type != "image/svg+xml";
             let Some(body) = body.members() else { continue };
             if is_binary {
                 body.insert("schema".into(), node!({"type": "string", "format": "binary"}));
@@ -193,6 +197,19 @@ fn bound_integer(schema: &mut Members) {
     schema.entry("maximum".into()).or_insert(node!(maximum));
 }
 
+/// Sizes and numbers of things, which have no format: nothing uses the highest bit.
+fn bound_size(schema: &mut Members) {
+    let kind = schema.get("type");
+    let is_integer = match kind {
+        Some(Node::List(kinds)) => kinds.iter().any(|kind| kind.as_str() == Some("integer")),
+        Some(kind) => kind.as_str() == Some("integer"),
+        None => false,
+    };
+    if is_integer && schema.get("format").is_none() {
+        schema.entry("maximum".into()).or_insert(node!(i64::MAX));
+    }
+}
+
 /// A covariance of (x, y, θ) has three rows of three.
 fn size_covariance(members: &mut Members) {
     let mut level = members.get_mut("covariance");
@@ -217,6 +234,7 @@ mod tests {
             "components": {"schemas": {"Pose": {"properties": {
                 "covariance": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
                 "count": {"type": "integer", "format": "u-int8"},
+                "size": {"type": ["integer", "null"], "minimum": 0},
             }}}},
         });
         apply(&mut document);
@@ -238,6 +256,7 @@ mod tests {
             (&members["count"]["format"], &members["count"]["maximum"]),
             (&"int32".into(), &255.into())
         );
+        assert_eq!(members["size"]["maximum"], i64::MAX);
         assert_eq!(members["covariance"]["items"]["minItems"], 3);
     }
 }
