@@ -16,9 +16,11 @@ mod anchors;
 mod block;
 mod config;
 mod decision_tree;
+mod features;
 mod flood;
 mod label;
 mod label_map;
+mod learned;
 mod map_labels;
 mod outline;
 mod passages;
@@ -31,12 +33,14 @@ mod signature;
 mod stretches;
 #[cfg(test)]
 mod tests;
+mod weights;
 
 pub use anchors::{Anchor, MovedPose, anchors_near, carry_point};
-pub use config::SemanticsConfig;
+pub use config::{LabelModel, SemanticsConfig};
 pub use decision_tree::{DecisionTreeConfig, label_by_tree};
 pub use label::PlaceLabel;
-pub use label_map::{DrivenRun, LabeledRun, label_runs};
+pub use label_map::{DrivenRun, LabeledRun, label_numbers, label_runs, place_numbers};
+pub use learned::{LearnedLabels, TreeNode};
 pub use map_labels::MapLabels;
 pub use passages::NamedRooms;
 pub use places::{Place, PlaceMap, Spot, Visit};

@@ -15,6 +15,7 @@ pub mod density_field;
 pub mod evaluation;
 pub mod open_world;
 pub mod particle_filter;
+pub mod place_learning;
 pub mod plot;
 pub mod recordings;
 pub mod report;
