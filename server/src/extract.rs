@@ -13,6 +13,7 @@ use serde::de::DeserializeOwned;
 use crate::app::site::Site;
 use crate::app::{AppError, Name};
 use crate::error::ApiError;
+use crate::http::as_documented::AsDocumented;
 use crate::http::values::{PageBounds, PageParams};
 use crate::http::wording::{located, of_cbor, plain};
 use crate::state::AppState;
@@ -66,6 +67,7 @@ impl Format {
             Self::Json => parse_json(if bytes.is_empty() { b"{}" } else { bytes }),
             Self::Cbor => parse_cbor(bytes),
         }
+        .map(|AsDocumented(value)| value)
     }
 }
 

@@ -79,25 +79,17 @@ export async function refusalOf(answer: Response): Promise<Refused> {
   }
 }
 
-let routes: Promise<Record<string, Record<string, unknown>>> | undefined;
-
-/** Whether this server has a route; its document says so. */
-export async function hasRoute(path: string, method: string): Promise<boolean> {
-  routes ??= getJson<{ paths: Record<string, Record<string, unknown>> }>("/openapi.json", {}).then(({ paths }) => paths);
-  return method in ((await routes)[path] ?? {});
-}
-
 /** The path of a site, and of what is below it. */
 export function sitePath(site: string, ...rest: string[]): string {
   return ["/v1/sites", encodeURIComponent(site), ...rest.map(encodeURIComponent)].join("/");
 }
 
 /** Saves an answer as a file; a plain link could not carry the key. */
-export async function save(path: string, name: string): Promise<void> {
+export async function save(path: string, name: string, edit?: (text: string) => string): Promise<void> {
   const answer = await fetchWithKey(path);
   if (!answer.ok) throw await refusalOf(answer);
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(await answer.blob());
+  link.href = URL.createObjectURL(edit ? new Blob([edit(await answer.text())]) : await answer.blob());
   link.download = name;
   link.click();
   window.setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

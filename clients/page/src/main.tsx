@@ -7,6 +7,7 @@ import { useCell } from "./cell";
 import { addressOf, usePlace } from "./place";
 import { Go } from "./ui";
 import { KeyDialog } from "./views/key";
+import { KeysPage } from "./views/keys";
 import { SitePage } from "./views/site";
 import { SitesPage } from "./views/sites";
 
@@ -36,12 +37,15 @@ function Page() {
         )}
         <span class="grow" />
         <a href="/docs/">API</a>
+        <Go to={addressOf(["keys"])} isCurrent={path[0] === "keys"}>
+          Keys
+        </Go>
         <button type="button" class="plain" onClick={() => setAsking(true)}>
-          {key ? "Key ✓" : "Key"}
+          {key ? "Key in use" : "Use a key"}
         </button>
       </header>
       {/* Another key may see other things, so everything is asked for again. */}
-      <Fragmented key={key}>{site ? <SitePage key={site} site={site} /> : <SitesPage />}</Fragmented>
+      <Fragmented key={key}>{site ? <SitePage key={site} site={site} /> : path[0] === "keys" ? <KeysPage /> : <SitesPage />}</Fragmented>
       {(isAsking || isWanted) && (
         <KeyDialog
           onClose={() => {

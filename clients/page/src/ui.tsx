@@ -175,14 +175,22 @@ export function Confirm(props: {
 /** A window over the page; the browser keeps the focus inside. */
 export function Dialog(props: { title: string; children: ComponentChildren; onClose: () => void }) {
   const dialog = useRef<HTMLDialogElement>(null);
+  const isGone = useRef(false);
   const id = useId();
   useEffect(() => {
     const shown = dialog.current;
     shown?.showModal();
-    return () => shown?.close();
+    return () => {
+      isGone.current = true;
+      shown?.close();
+    };
   }, []);
+  // The browser tells of the end also when another window has already taken the place of this one.
+  const close = () => {
+    if (!isGone.current) props.onClose();
+  };
   return (
-    <dialog ref={dialog} aria-labelledby={id} onCancel={props.onClose} onClose={props.onClose}>
+    <dialog ref={dialog} aria-labelledby={id} onCancel={close} onClose={close}>
       <h2 id={id}>{props.title}</h2>
       {props.children}
     </dialog>
@@ -213,12 +221,16 @@ export function Figures({ figures }: { figures: readonly (readonly [string, Comp
 }
 
 export const count = (value: number) => value.toLocaleString("en");
+/** A share; one that is nearly all is not called all. */
 export const percent = (value: number) => {
   const share = 100 * value;
+  if (share >= 99.95 && share < 100) return "> 99.9 %";
   return `${share > 99 && share < 100 ? share.toFixed(1) : Math.round(share)} %`;
 };
+/** A probability, which is never certain. */
+export const probability = (value: number) => (value >= 0.9995 ? "> 99.9 %" : value < 0.001 ? "< 0.1 %" : percent(value));
 export const metres = (value: number) =>
-  Math.abs(value) >= 100 ? `${count(Math.round(value))} m` : Math.abs(value) >= 1 ? `${value.toFixed(1)} m` : `${(100 * value).toFixed(1)} cm`;
+  Math.abs(value) >= 100 ? `${count(Math.round(value))} m` : Math.abs(value) >= 1 ? `${value.toFixed(1)} m` : value === 0 ? "0 m" : `${(100 * value).toFixed(1)} cm`;
 export const degrees = (angle_rad: number) => `${((180 / Math.PI) * angle_rad).toFixed(Math.abs(angle_rad) < 0.17 ? 1 : 0)}°`;
 export const bytes = (value: number) => (value < 1e6 ? `${Math.ceil(value / 1e3)} kB` : `${(value / 1e6).toFixed(1)} MB`);
 /** One thing or several. */

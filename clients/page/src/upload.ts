@@ -2,8 +2,8 @@
 
 import { api, isStatus } from "./api";
 import type { Schemas } from "./api";
-import { wireScan } from "./carmen/file";
-import type { Recording } from "./carmen/log";
+import { wireScan } from "./recording";
+import type { Recording } from "./recording";
 
 const SCANS_PER_BATCH = 100;
 

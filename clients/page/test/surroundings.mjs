@@ -70,7 +70,7 @@ export async function startBrowser(url) {
   const expected = [];
   async function open(options = {}) {
     const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, baseURL: url, ...options });
-    context.setDefaultTimeout(60_000);
+    context.setDefaultTimeout(30_000);
     const page = await context.newPage();
     page.on("request", (request) => {
       const asked = new URL(request.url());
@@ -127,7 +127,7 @@ export async function colorsOf(page, selector) {
 }
 
 /** Waits until something holds. */
-export async function until(holds, what, limit_ms = 120_000) {
+export async function until(holds, what, limit_ms = 60_000) {
   for (const end = Date.now() + limit_ms; Date.now() < end; ) {
     if (await holds()) return;
     await new Promise((resolve) => setTimeout(resolve, 200));

@@ -7,6 +7,7 @@ import os
 import subprocess
 from pathlib import Path
 
+import attrs
 import numpy as np
 import pytest
 from conftest import REPOSITORY, write_bag
@@ -97,7 +98,8 @@ def test_logs_are_read_as_the_command_line_reads_them(client: Client, drives: Pa
     for log in logs:
         ours = open_recording(log)
         theirs = site.run(ours.name)
-        assert theirs.geometry == ours.geometry, log.name
+        # What a recording leaves unsaid the server answers as it takes it.
+        assert theirs.geometry == attrs.evolve(ours.geometry, range_min_m=0.0), log.name
         assert theirs.num_scans == ours.num_scans
         scan = next(iter(site.scans(ours.name, limit=1)))
         first = next(iter(ours.scans))

@@ -1497,11 +1497,8 @@ export interface components {
         Key: {
             /** @description Its name. */
             name: string;
-            /**
-             * @description What it may do.
-             * @example write
-             */
-            scope: string;
+            /** @description What it may do. */
+            scope: components["schemas"]["Scope"];
             /** @description Where. */
             sites: string[];
             /** @description Whether it stands in the server's configuration, where the API cannot change it. */
@@ -1839,11 +1836,8 @@ export interface components {
              * @example robot-7
              */
             name: string;
-            /**
-             * @description `read`, `write` or `admin`.
-             * @example write
-             */
-            scope: string;
+            /** @description `read`, `write` or `admin`. */
+            scope: components["schemas"]["Scope"];
             /**
              * @description Sites it may do it in; `*` means all.
              * @example [
@@ -2023,6 +2017,8 @@ export interface components {
             /** @description Covariance of (x, y, θ), row by row. */
             covariance: number[][];
         };
+        /** @description x and y, metres. */
+        Position: number[];
         /** @description What went wrong (RFC 9457). */
         Problem: {
             /**
@@ -2318,20 +2314,25 @@ export interface components {
             /** @description Readings in metres, in the order of the geometry's beams. */
             ranges_m: components["schemas"]["Ranges"];
         };
+        /**
+         * @description What a key may do; each scope includes those before it.
+         * @enum {string}
+         */
+        Scope: "read" | "write" | "admin";
         /** @description A shape in metres. */
         Shape: {
-            /** @description x and y. */
-            coordinates: number[];
+            /** @description A position. */
+            coordinates: components["schemas"]["Position"];
             /** @enum {string} */
             type: "Point";
         } | {
-            /** @description x and y of each; at least two. */
-            coordinates: number[][];
+            /** @description A line through at least two positions. */
+            coordinates: components["schemas"]["Position"][];
             /** @enum {string} */
             type: "LineString";
         } | {
-            /** @description The outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first. */
-            coordinates: number[][][];
+            /** @description An area: the outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first. */
+            coordinates: components["schemas"]["Position"][][];
             /** @enum {string} */
             type: "Polygon";
         };
@@ -3286,9 +3287,9 @@ export interface operations {
             };
             cookie?: never;
         };
-        requestBody: {
+        requestBody?: {
             content: {
-                "application/json": components["schemas"]["SiteChange"];
+                "application/json": components["schemas"]["SiteChange"] | null;
             };
         };
         responses: {

@@ -7,11 +7,14 @@ use thiserror::Error;
 /// about six digits, and a nearly singular one (a plain corridor) may come back slightly indefinite.
 const ROUNDING: f64 = 1e-5;
 
+/// Products of three entries are finite below.
+const LARGEST: f64 = 1e100;
+
 /// Why three by three numbers are no information matrix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum InformationError {
-    /// NaN or ∞.
-    #[error("it has numbers that are not finite")]
+    /// NaN, ∞, or so large that products of it are.
+    #[error("it has numbers that are not finite, or beyond 1e100")]
     NotFinite,
     /// Ω differs from its transpose by more than rounding.
     #[error("it is not symmetric")]
@@ -37,7 +40,7 @@ impl InformationMatrix {
     /// # Errors
     /// [`InformationError`] with the first property that does not hold.
     pub fn try_new(matrix: Matrix3<f64>) -> Result<Self, InformationError> {
-        if !matrix.iter().all(|number| number.is_finite()) {
+        if !matrix.iter().all(|number| number.abs() <= LARGEST) {
             return Err(InformationError::NotFinite);
         }
         let scale = matrix.amax();
@@ -104,6 +107,8 @@ mod tests {
     fn names_what_is_wrong() {
         let nan = Matrix3::from_diagonal(&[1.0, f64::NAN, 1.0].into());
         assert_eq!(InformationMatrix::try_new(nan), Err(InformationError::NotFinite));
+        let huge = Matrix3::from_diagonal(&[1.0, -1e308, 1.0].into());
+        assert_eq!(InformationMatrix::try_new(huge), Err(InformationError::NotFinite));
         let negative = Matrix3::from_diagonal(&[1.0, -1.0, 1.0].into());
         assert_eq!(InformationMatrix::try_new(negative), Err(InformationError::NotPositiveSemidefinite));
         let mut skew = Matrix3::identity();

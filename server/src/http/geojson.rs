@@ -15,38 +15,34 @@ const FARTHEST_M: f64 = 1e7;
 /// A shape in metres.
 // Other members are passed over, as GeoJSON wants it: programs add a `bbox` or more.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
-#[serde(tag = "type")]
+#[serde(tag = "type", content = "coordinates")]
 pub enum ShapeDto {
     /// A position.
-    Point {
-        /// x and y.
-        #[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
-        coordinates: [f64; 2],
-    },
-    /// A line through positions.
-    LineString {
-        /// x and y of each; at least two.
-        coordinates: Vec<[f64; 2]>,
-    },
-    /// An area.
-    Polygon {
-        /// The outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first.
-        coordinates: Vec<Vec<[f64; 2]>>,
-    },
+    Point(PositionDto),
+    /// A line through at least two positions.
+    LineString(Vec<PositionDto>),
+    /// An area: the outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first.
+    Polygon(Vec<Vec<PositionDto>>),
 }
 
-fn xy(point: &Point2) -> [f64; 2] {
-    [point.x, point.y]
+/// x and y, metres.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+#[serde(transparent)]
+#[schema(value_type = Vec<f64>, min_items = 2, max_items = 2)]
+pub struct PositionDto([f64; 2]);
+
+fn xy(point: &Point2) -> PositionDto {
+    PositionDto([point.x, point.y])
 }
 
 impl From<&Shape> for ShapeDto {
     fn from(shape: &Shape) -> Self {
         match shape {
-            Shape::Point(point) => Self::Point { coordinates: xy(point) },
-            Shape::Line(points) => Self::LineString { coordinates: points.iter().map(xy).collect() },
+            Shape::Point(point) => Self::Point(xy(point)),
+            Shape::Line(points) => Self::LineString(points.iter().map(xy).collect()),
             Shape::Polygon(rings) => {
                 let ring = |ring: &Vec<Point2>| ring.iter().map(xy).collect();
-                Self::Polygon { coordinates: rings.iter().map(ring).collect() }
+                Self::Polygon(rings.iter().map(ring).collect())
             }
         }
     }
@@ -56,7 +52,7 @@ impl ShapeDto {
     /// A polygon of rings that are closed implicitly.
     pub fn polygon(rings: &[Vec<Point2>]) -> Self {
         let ring = |ring: &Vec<Point2>| ring.iter().chain(ring.first()).map(xy).collect();
-        Self::Polygon { coordinates: rings.iter().map(ring).collect() }
+        Self::Polygon(rings.iter().map(ring).collect())
     }
 
     /// The shape, when it is one.
@@ -65,15 +61,13 @@ impl ShapeDto {
     /// 422 that names the coordinate.
     pub fn check(&self) -> Result<Shape, ApiError> {
         let shape = match self {
-            Self::Point { coordinates } => Shape::Point(position("geometry.coordinates", coordinates)?),
-            Self::LineString { coordinates } => {
-                Shape::Line(positions("geometry.coordinates", coordinates, 2)?)
-            }
-            Self::Polygon { coordinates } => {
+            Self::Point(coordinates) => Shape::Point(position("geometry.coordinates", coordinates)?),
+            Self::LineString(coordinates) => Shape::Line(positions("geometry.coordinates", coordinates, 2)?),
+            Self::Polygon(coordinates) => {
                 if coordinates.is_empty() {
                     return Err(ApiError::invalid("geometry.coordinates", "a polygon has an outer border"));
                 }
-                let ring = |(idx, ring): (usize, &Vec<[f64; 2]>)| {
+                let ring = |(idx, ring): (usize, &Vec<PositionDto>)| {
                     let field = format!("geometry.coordinates[{idx}]");
                     let points = positions(&field, ring, 4)?;
                     if points.first() != points.last() {
@@ -92,14 +86,14 @@ impl ShapeDto {
     }
 }
 
-fn positions(field: &str, given: &[[f64; 2]], num_min: usize) -> Result<Vec<Point2>, ApiError> {
+fn positions(field: &str, given: &[PositionDto], num_min: usize) -> Result<Vec<Point2>, ApiError> {
     if given.len() < num_min {
         return Err(ApiError::invalid(field, format!("at least {num_min} positions are needed")));
     }
     given.iter().enumerate().map(|(idx, xy)| position(&format!("{field}[{idx}]"), xy)).collect()
 }
 
-fn position(field: &str, [x, y]: &[f64; 2]) -> Result<Point2, ApiError> {
+fn position(field: &str, PositionDto([x, y]): &PositionDto) -> Result<Point2, ApiError> {
     for (idx, value) in [x, y].into_iter().enumerate() {
         if !value.is_finite() || value.abs() > FARTHEST_M {
             let detail = format!("{value} must be a number within ±{FARTHEST_M:e}");
@@ -201,7 +195,7 @@ mod tests {
         let with_more = serde_json::json!({"type": "Point", "coordinates": [0, 0], "bbox": []});
         assert_eq!(
             serde_json::from_value::<ShapeDto>(with_more).unwrap(),
-            ShapeDto::Point { coordinates: [0.0; 2] }
+            ShapeDto::Point(PositionDto([0.0; 2]))
         );
     }
 }

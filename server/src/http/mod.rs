@@ -9,6 +9,7 @@
 //! `resources` holds a file per resource: its parameters, its bodies, its handlers. `forms` holds the map in the
 //! formats of other tools, `geojson` shapes as GeoJSON writes them, `page` the files of the page under `/ui`.
 
+pub(crate) mod as_documented;
 mod forms;
 mod geojson;
 pub(crate) mod nanoseconds;
@@ -18,7 +19,6 @@ mod ranges;
 pub(crate) mod resources;
 pub(crate) mod routes;
 pub(crate) mod values;
-mod whole;
 pub(crate) mod wording;
 
 use axum::http::{HeaderValue, header};

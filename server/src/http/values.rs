@@ -179,14 +179,13 @@ fn parse_cursor(cursor: &str) -> Option<u64> {
     if is_written_by_a_page { cursor.parse().ok() } else { None }
 }
 
-/// A version in a query; numbers that no version has are told, whether or not the answer depends on it.
-pub(crate) fn version_number<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
-    let version = Option::<u64>::deserialize(deserializer)?;
-    match version {
-        Some(version) if i64::try_from(version).is_err() => {
+/// Reads a number of a query; those that nothing has are told, whether or not the answer depends on them.
+pub(crate) fn in_query<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
+    match Option::<u64>::deserialize(deserializer)? {
+        Some(number) if i64::try_from(number).is_err() => {
             Err(serde::de::Error::custom("the number is too large"))
         }
-        _ => Ok(version),
+        number => Ok(number),
     }
 }
 

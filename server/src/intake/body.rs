@@ -4,6 +4,7 @@ use std::error::Error;
 use std::fmt;
 use std::pin::Pin;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::task::{Context, Poll};
 use std::time::Duration;
 
@@ -37,6 +38,7 @@ struct Paced {
     stall_max: Duration,
     next: Pin<Box<Sleep>>,
     end: Instant,
+    is_read: Arc<AtomicBool>,
 }
 
 impl HttpBody for Paced {
@@ -50,6 +52,9 @@ impl HttpBody for Paced {
         if let Poll::Ready(frame) = Pin::new(&mut self.body).poll_frame(cx) {
             let deadline = self.end.min(Instant::now() + self.stall_max);
             self.next.as_mut().reset(deadline);
+            if frame.is_none() || self.body.is_end_stream() {
+                self.is_read.store(true, Ordering::Relaxed);
+            }
             return Poll::Ready(frame.map(|frame| frame.map_err(Into::into)));
         }
         self.next.as_mut().poll(cx).map(|()| Some(Err(TooSlow.into())))
@@ -64,16 +69,21 @@ impl HttpBody for Paced {
     }
 }
 
-/// Sets the pace of a request's body as it comes from the network, before it is decompressed.
-pub(super) fn pace(request: Request, limits: &LimitsConfig) -> Request {
+/// Sets the pace of a request's body as it comes from the network, before it is decompressed. The flag says later whether
+/// all of it was read.
+pub(super) fn pace(request: Request, limits: &LimitsConfig) -> (Request, Arc<AtomicBool>) {
     let stall_max = Duration::from_secs_f64(limits.stall_max_s);
     let end = Instant::now() + Duration::from_secs_f64(limits.body_time_max_s);
-    request.map(|body| {
+    let is_read = Arc::new(AtomicBool::new(request.body().is_end_stream()));
+    let flag = Arc::clone(&is_read);
+    let request = request.map(|body| {
         if body.is_end_stream() {
             return body;
         }
-        Body::new(Paced { body, stall_max, next: Box::pin(tokio::time::sleep(stall_max)), end })
-    })
+        let next = Box::pin(tokio::time::sleep(stall_max));
+        Body::new(Paced { body, stall_max, next, end, is_read: flag })
+    });
+    (request, is_read)
 }
 
 /// Spells the coding as the decompression knows it; codings do not depend on case, and `x-gzip` is `gzip`.

@@ -7,11 +7,13 @@ mod body;
 mod pool;
 
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::{Request, State};
-use axum::http::header::CONTENT_LENGTH;
+use axum::http::header::{CONNECTION, CONTENT_LENGTH};
+use axum::http::{HeaderValue, Version};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
@@ -139,11 +141,21 @@ fn queue_full() -> ApiError {
 }
 
 /// Gives every request the places, its body a pace and its coding a known spelling.
+///
+/// What is left of a body after its answer would stand before the next request, so its connection ends; the answer says
+/// so, or a client would send that request into the closing connection.
 pub async fn prepare(State(places): State<Arc<Places>>, request: Request, next: Next) -> Response {
-    let mut request = body::pace(request, &places.limits);
-    if let Err(refusal) = body::normalize_coding(&mut request) {
-        return refusal.into_response();
+    let is_http1 = request.version() < Version::HTTP_2;
+    let (mut request, is_read) = body::pace(request, &places.limits);
+    let mut response = match body::normalize_coding(&mut request) {
+        Ok(()) => {
+            request.extensions_mut().insert(places);
+            next.run(request).await
+        }
+        Err(refusal) => refusal.into_response(),
+    };
+    if is_http1 && !is_read.load(Ordering::Relaxed) {
+        response.headers_mut().insert(CONNECTION, HeaderValue::from_static("close"));
     }
-    request.extensions_mut().insert(places);
-    next.run(request).await
+    response
 }

@@ -1,11 +1,12 @@
-// Recordings from files that a person chose in the browser.
+// CARMEN logs from files of the browser, line by line.
 
-import type { Schemas } from "../api";
+import { runName } from "../recording";
+import type { Recording } from "../recording";
 import { CarmenReader } from "./log";
-import type { CarmenOptions, RecordedScan, Recording } from "./log";
+import type { CarmenOptions } from "./log";
 
 /** Reads a log, plain or gzipped; `progress` is told the share of the file that is read. */
-export async function readFile(file: File, options: CarmenOptions, progress: (share: number) => void): Promise<Recording> {
+export async function readCarmen(file: File, options: CarmenOptions, progress: (share: number) => void): Promise<Recording> {
   const reader = new CarmenReader(options);
   let bytesRead = 0;
   const counted = new TransformStream<Uint8Array, Uint8Array>({
@@ -34,38 +35,4 @@ export async function readFile(file: File, options: CarmenOptions, progress: (sh
     if (++numRounds % 16 === 0) await new Promise((resolve) => setTimeout(resolve));
   }
   return reader.finish(runName(file.name));
-}
-
-/** The file's name without its endings, in the characters that names of runs may have. */
-export function runName(fileName: string): string {
-  const stem = [".gz", ".log", ".clf", ".carmen", ".txt"].reduce(
-    (name, ending) => (name.endsWith(ending) ? name.slice(0, -ending.length) : name),
-    fileName,
-  );
-  const name = [...stem.replace(/^\.+/, "")].map((letter) => (/[A-Za-z0-9._-]/.test(letter) ? letter : "-")).join("");
-  return name.slice(0, 64) || "run";
-}
-
-/** A scan as the API takes it. */
-export function wireScan(scan: RecordedScan, geometry: Schemas["Geometry"]): Schemas["Scan"] {
-  const ranges_m = Array.from(scan.ranges_m, (range) => (range > 0 && range < geometry.range_max_m ? shortest(range) : null));
-  // Nanoseconds do not fit a number of JavaScript; the API takes them as text too.
-  const timestamp_ns = scan.timestamp_ns.toString() as unknown as number;
-  return { timestamp_ns, odom_from_robot: scan.odom_from_robot, ranges_m };
-}
-
-/** The number with few digits that is this reading once it is rounded to 32 bits, so that less has to be sent. */
-function shortest(range_m: number): number {
-  const short = Number(range_m.toPrecision(7));
-  return Math.fround(short) === range_m ? short : range_m;
-}
-
-/** Metres driven up to each scan, by odometry. */
-export function travelOf(recording: Recording): Float64Array {
-  const travel = new Float64Array(recording.scans.length);
-  recording.scans.forEach(({ odom_from_robot: at }, i) => {
-    const before = recording.scans[i - 1]?.odom_from_robot;
-    if (before) travel[i] = travel[i - 1]! + Math.hypot(at.x - before.x, at.y - before.y);
-  });
-  return travel;
 }

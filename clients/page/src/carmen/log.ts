@@ -1,31 +1,14 @@
 // CARMEN logs, read as `locution replay` reads them: the rules are those of `engine/src/formats/carmen.rs`, and the
 // page's test compares what both make of the same files.
 
-import type { Schemas } from "../api";
 import type { Pose } from "../geometry";
+import type { RecordedScan, Recording } from "../recording";
 import { StatedLaser } from "./beams";
 import type { BeamAngles } from "./beams";
 import { Fields, FormatError, parseNumber, parseSecondsNs, wrapAngle } from "./fields";
 
 /** No laser sees farther than this, metres. */
 const PLAUSIBLE_RANGE_M = 200;
-
-/** A scan of a recording. */
-export interface RecordedScan {
-  timestamp_ns: bigint;
-  odom_from_robot: Pose;
-  /** Metres; infinity where nothing came back. */
-  ranges_m: Float32Array;
-}
-
-/** A recording: what all scans share, and the scans in file order. */
-export interface Recording {
-  name: string;
-  geometry: Schemas["Geometry"];
-  scans: RecordedScan[];
-  /** Lines passed over because they could not be read. */
-  skipped: string[];
-}
 
 /** What the reader is told about a log. */
 export interface CarmenOptions {
@@ -49,7 +32,7 @@ export class CarmenReader {
   private first: { line: number; scan: LineScan } | undefined;
   private readonly mountings: Pose[] = [];
   private readonly scans: RecordedScan[] = [];
-  readonly skipped: string[] = [];
+  private readonly skipped: string[] = [];
 
   constructor(private readonly options: CarmenOptions = {}) {}
 
@@ -113,7 +96,9 @@ export class CarmenReader {
       range_max_m: this.options.range_max_m ?? rangeMax(scan.range_max_m, this.scans),
       robot_from_laser: medianMounting(this.mountings),
     };
-    return { name, geometry, scans: this.scans, skipped: this.skipped };
+    const { length } = this.skipped;
+    const notes = length ? [`${length} lines that cannot be read are passed over; the first: ${this.skipped[0]}`] : [];
+    return { name, geometry, scans: this.scans, notes };
   }
 
   private checkMeters(line: number): void {

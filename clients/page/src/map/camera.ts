@@ -62,6 +62,17 @@ export class Drawing {
     return this.height / 2 - (y - this.camera.y) * this.camera.scale;
   }
 
+  /** Whether the box around two points may be seen; with the room that what is drawn there takes. */
+  isInView(a: Point, b: Point, margin_px = 120): boolean {
+    const margin = margin_px / this.camera.scale;
+    return (
+      Math.max(a.x, b.x) > this.low.x - margin &&
+      Math.min(a.x, b.x) < this.high.x + margin &&
+      Math.max(a.y, b.y) > this.low.y - margin &&
+      Math.min(a.y, b.y) < this.high.y + margin
+    );
+  }
+
   get ink(): string {
     return this.isDark ? "#e8eaee" : "#23272f";
   }

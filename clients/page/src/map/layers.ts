@@ -128,24 +128,41 @@ export function matchesLayer(matches: PlacedMatch[], chosen: string | undefined)
   };
 }
 
+/** Most dashes of one kind of match; more would blur into a line, and take their time. */
+const DASHES_MAX = 1500;
+/** More matches of one kind than this are drawn thin. */
+const MATCHES_THIN = 500;
+
 function drawMatches(drawing: Drawing, name: string, group: PlacedMatch[]): void {
   const [state = "", channel = ""] = name.split(" ");
   const { context } = drawing;
+  const shown = group.filter(({ earlier, later }) => drawing.isInView(earlier, later));
   context.strokeStyle = STATE_COLORS[state] ?? "#888888";
   context.fillStyle = context.strokeStyle;
   context.globalAlpha = state === "rejected" ? 0.55 : 0.9;
-  context.lineWidth = 1.5;
-  context.setLineDash(CHANNEL_DASHES[channel] ?? []);
-  context.beginPath();
-  for (const { earlier, later } of group) {
-    context.moveTo(drawing.px(earlier.x), drawing.py(earlier.y));
-    context.lineTo(drawing.px(later.x), drawing.py(later.y));
+  // Lines of a pixel are drawn the quick way.
+  context.lineWidth = shown.length > MATCHES_THIN ? 1 : 1.5;
+  const dashes = CHANNEL_DASHES[channel] ?? [];
+  const period = dashes.reduce((sum, part) => sum + part, 0);
+  // What is shorter than a dash and its gap is a dash.
+  const [dashed, solid] = [new Path2D(), new Path2D()];
+  let numDashes = 0;
+  for (const { earlier, later } of shown) {
+    const [x, y] = [drawing.px(earlier.x), drawing.py(earlier.y)];
+    const [toX, toY] = [drawing.px(later.x), drawing.py(later.y)];
+    const length = Math.min(Math.abs(toX - x) + Math.abs(toY - y), drawing.width + drawing.height);
+    const path = length > period && period > 0 ? dashed : solid;
+    if (path === dashed) numDashes += length / period;
+    path.moveTo(x, y);
+    path.lineTo(toX, toY);
   }
-  context.stroke();
+  context.stroke(solid);
+  context.setLineDash(numDashes < DASHES_MAX ? dashes : []);
+  context.stroke(dashed);
   context.setLineDash([]);
   // Both ends, so that a match shows that is shorter than a pixel.
   const size = drawing.camera.scale > 15 ? 5 : 3;
-  for (const { earlier, later } of group) {
+  for (const { earlier, later } of shown) {
     for (const end of [earlier, later]) {
       context.fillRect(drawing.px(end.x) - size / 2, drawing.py(end.y) - size / 2, size, size);
     }
@@ -195,6 +212,7 @@ export function labelsLayer(labels: Schemas["Label"][]): Layer {
     draw(drawing) {
       for (const label of labels) {
         const { x, y } = label.map_from_middle;
+        if (!drawing.isInView(label.map_from_middle, label.map_from_middle)) continue;
         drawDisc(drawing, { x, y }, LABEL_COLORS[label.label] ?? "#888888", 5.5);
         if (drawing.camera.scale > 14) drawText(drawing, { x, y }, label.label, 9);
       }
@@ -241,6 +259,7 @@ export interface Area {
   note: string;
   color: string;
   outline: Point[];
+  holes: Point[][];
   center: Point;
 }
 
@@ -250,11 +269,13 @@ export function areasLayer(areas: Area[]): Layer {
       const { context } = drawing;
       for (const area of areas) {
         context.beginPath();
-        for (const point of area.outline) context.lineTo(drawing.px(point.x), drawing.py(point.y));
-        context.closePath();
+        for (const ring of [area.outline, ...area.holes]) {
+          ring.forEach((point, i) => context[i ? "lineTo" : "moveTo"](drawing.px(point.x), drawing.py(point.y)));
+          context.closePath();
+        }
         context.fillStyle = area.color;
         context.globalAlpha = drawing.isDark ? 0.3 : 0.24;
-        context.fill();
+        context.fill("evenodd");
         context.globalAlpha = 1;
         context.strokeStyle = area.color;
         context.lineWidth = 1.5;
@@ -263,7 +284,7 @@ export function areasLayer(areas: Area[]): Layer {
       if (drawing.camera.scale > 8) for (const area of areas) drawText(drawing, area.center, area.name, 0, true);
     },
     pick(point, radius_m) {
-      const area = areas.find(({ outline }) => isInside(point, outline));
+      const area = areas.find(({ outline, holes }) => isInside(point, outline) && !holes.some((hole) => isInside(point, hole)));
       return area && { hit: { kind: "note", text: `${area.name}: ${area.note}` }, distance_m: 1.8 * radius_m };
     },
   };
@@ -277,6 +298,14 @@ function isInside(point: Point, outline: Point[]): boolean {
     if (crosses && point.x < ((b.x - a.x) * (point.y - a.y)) / (b.y - a.y) + a.x) inside = !inside;
   });
   return inside;
+}
+
+export function doorsLayer(doors: Point[]): Layer {
+  return {
+    draw(drawing) {
+      for (const door of doors) drawDisc(drawing, door, drawing.isDark ? "#ffffff" : "#23272f", 3.5);
+    },
+  };
 }
 
 export function roomColor(idx: number): string {

@@ -3,6 +3,7 @@
 import type { Bounds, Point } from "../geometry";
 import { SCALE_MAX, SCALE_MIN, Drawing, cameraFor } from "./camera";
 import type { Camera } from "./camera";
+import { MovedPicture } from "./moved";
 
 /** What lies under a pointer. */
 export type Hit =
@@ -30,6 +31,8 @@ export interface Tool {
 const CLICK_PX = 6;
 const PICK_PX = 12;
 const STEP_PX = 80;
+/** A camera that has not moved for this long rests, milliseconds. */
+const REST_MS = 120;
 
 export class MapView {
   layers: Layer[] = [];
@@ -43,9 +46,11 @@ export class MapView {
   private readonly context: CanvasRenderingContext2D;
   private readonly pointers = new Map<number, Point>();
   private drawn: Point[] = [];
-  private moved = 0;
+  private travel_px = 0;
   private wasPinched = false;
   private frame = 0;
+  private rest = 0;
+  private readonly moved = new MovedPicture();
   private readonly darkness = window.matchMedia("(prefers-color-scheme: dark)");
   private readonly ends = new AbortController();
 
@@ -74,6 +79,7 @@ export class MapView {
   end(): void {
     this.ends.abort();
     cancelAnimationFrame(this.frame);
+    window.clearTimeout(this.rest);
   }
 
   get camera(): Camera {
@@ -82,7 +88,9 @@ export class MapView {
 
   set camera(camera: Camera) {
     this.current = { ...camera, scale: Math.min(Math.max(camera.scale, SCALE_MIN), SCALE_MAX) };
-    this.redraw();
+    window.clearTimeout(this.rest);
+    this.rest = window.setTimeout(() => this.redraw(), REST_MS);
+    this.askFrame();
   }
 
   /** Moves by hand or key: the camera, and whoever keeps it in the address. */
@@ -112,9 +120,19 @@ export class MapView {
     this.steer({ x: fixed.x - offset.x / scale, y: fixed.y + offset.y / scale, scale });
   }
 
+  /** Draws everything anew, since something of it has changed. */
   redraw(): void {
-    this.frame ||= requestAnimationFrame(() => {
+    window.clearTimeout(this.rest);
+    this.moved.drop();
+    this.askFrame();
+  }
+
+  private askFrame(): void {
+    if (this.frame) return;
+    this.moved.ask(performance.now());
+    this.frame = requestAnimationFrame(() => {
       this.frame = 0;
+      this.moved.come(performance.now());
       this.draw();
     });
   }
@@ -130,14 +148,20 @@ export class MapView {
     const { context } = this;
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     const drawing = new Drawing(context, this.current, width, height, this.darkness.matches);
+    if (!this.moved.draw(context, this.current, width, height, drawing.paper)) this.drawLayers(drawing);
+    this.drawTool(drawing);
+  }
+
+  private drawLayers(drawing: Drawing): void {
+    const { context } = this;
     context.fillStyle = drawing.paper;
-    context.fillRect(0, 0, width, height);
+    context.fillRect(0, 0, drawing.width, drawing.height);
     for (const layer of this.layers) {
       context.save();
       layer.draw(drawing);
       context.restore();
     }
-    this.drawTool(drawing);
+    this.moved.keep(this.canvas, this.current, performance.now());
   }
 
   /** The path being drawn; and a cross in the middle for those who aim with keys. */
@@ -182,7 +206,7 @@ export class MapView {
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, this.pixelOf(event));
     if (this.pointers.size === 1) {
-      this.moved = 0;
+      this.travel_px = 0;
       this.wasPinched = false;
       this.drawn = this.tool?.kind === "path" && event.button === 0 ? [this.pointAt(this.pixelOf(event))] : [];
     } else {
@@ -198,7 +222,7 @@ export class MapView {
     if (!before) return;
     const others = [...this.pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
     this.pointers.set(event.pointerId, pixel);
-    this.moved += Math.hypot(pixel.x - before.x, pixel.y - before.y);
+    this.travel_px += Math.hypot(pixel.x - before.x, pixel.y - before.y);
     const other = others[0];
     if (other) {
       // The point between the fingers stays between them.
@@ -209,7 +233,7 @@ export class MapView {
       this.drawn.push(this.pointAt(pixel));
       this.tool?.take(this.drawn, false);
       this.redraw();
-    } else if (this.moved > CLICK_PX) {
+    } else if (this.travel_px > CLICK_PX) {
       this.pan(pixel.x - before.x, pixel.y - before.y);
     }
   }
@@ -217,11 +241,11 @@ export class MapView {
   private up(event: PointerEvent): void {
     if (!this.pointers.delete(event.pointerId) || this.pointers.size) return;
     if (this.wasPinched) return;
-    if (this.drawn.length > 1 && this.moved > CLICK_PX) {
+    if (this.drawn.length > 1 && this.travel_px > CLICK_PX) {
       this.tool?.take(this.drawn, true);
       this.drawn = [];
       this.redraw();
-    } else if (this.moved <= CLICK_PX && event.button === 0) {
+    } else if (this.travel_px <= CLICK_PX && event.button === 0) {
       this.click(this.pointAt(this.pixelOf(event)));
     }
   }

@@ -3,14 +3,14 @@
 import { useMemo, useState } from "preact/hooks";
 import { api } from "../api";
 import type { Schemas } from "../api";
-import { travelOf, wireScan } from "../carmen/file";
-import type { Recording } from "../carmen/log";
 import { useAction } from "../cell";
 import { returnsOf } from "../geometry";
 import { guessesLayer } from "../map/layers";
 import { patch } from "../place";
+import { travelOf, wireScan } from "../recording";
+import type { Recording } from "../recording";
 import { useOverlay, useSite } from "../site";
-import { Alert, metres, percent } from "../ui";
+import { Alert, metres, percent, probability } from "../ui";
 import { FilePicker, RecordingLine } from "./recordings";
 
 /** More than this is not looked at by the server. */
@@ -75,7 +75,7 @@ function ExamplePlaces({ answer, recording, last }: { answer: Schemas["ExampleAn
   const returns = useMemo(() => (scan ? returnsOf({ ranges_m: Array.from(scan.ranges_m) }, recording.geometry) : []), [scan]);
   const guesses = answer.places
     .filter((place) => place.component === component)
-    .map((place, idx) => ({ pose: place.map_from_robot, covariance: place.covariance, probability: place.probability, name: percent(place.probability), ...(idx === 0 && { returns }) }));
+    .map((place, idx) => ({ pose: place.map_from_robot, covariance: place.covariance, probability: place.probability, name: probability(place.probability), ...(idx === 0 && { returns }) }));
   useOverlay([guessesLayer(guesses)], JSON.stringify([answer, component]));
   const show = (place: Schemas["ExamplePlace"]) => {
     if (place.component !== component) patch({ component: String(place.component), at: undefined });
@@ -97,7 +97,7 @@ function ExamplePlaces({ answer, recording, last }: { answer: Schemas["ExampleAn
                   {place.direction === "same" ? "same way" : "opposite way"}; {percent(place.evidence.coverage)} of the returns are on the map, {percent(place.evidence.contradicted)} of these in free space
                 </small>
               </span>
-              <span class="num">{percent(place.probability)}</span>
+              <span class="num">{probability(place.probability)}</span>
             </button>
           </li>
         ))}

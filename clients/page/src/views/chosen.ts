@@ -1,19 +1,21 @@
 // Which layers the address asks for, and what they show.
 
 import { useMemo } from "preact/hooks";
-import { getJson, listAll, sitePath } from "../api";
+import { listAll, sitePath } from "../api";
 import type { Schemas } from "../api";
 import { useLoaded } from "../cell";
 import { LABEL_COLORS } from "../colors";
 import { pathByClass, pathByDensity } from "../drives";
+import type { Point } from "../geometry";
 import type { Grid } from "../map/grid";
-import { areasLayer, changesLayer, labelsLayer, matchesLayer, roomColor, runsLayer, wallsLayer, wordsLayer } from "../map/layers";
+import { areasLayer, changesLayer, doorsLayer, labelsLayer, matchesLayer, roomColor, runsLayer, wallsLayer, wordsLayer } from "../map/layers";
 import type { Area, RunLine } from "../map/layers";
 import { Polyline } from "../map/polyline";
 import type { Layer } from "../map/view";
 import { usePlace } from "../place";
 import { driveOfRun, keptOnce, keyOf, matchesOf, placeMatches } from "../site";
 import type { SiteState } from "../site";
+import { many } from "../ui";
 
 /** Layers in the order in which they are drawn, with what they are called. */
 export const LAYERS = [
@@ -52,6 +54,12 @@ export function useChoice(): Choice {
   };
 }
 
+/** Rooms as areas, with the doors between them. */
+interface RoomsShown {
+  areas: Area[];
+  doors: Point[];
+}
+
 /** The layers that are shown. */
 export interface Layers {
   choice: Choice;
@@ -86,7 +94,7 @@ export function useLayers(state: SiteState, grid: Grid | undefined): Layers {
   );
   const made: Record<LayerName, () => Layer | undefined> = {
     walls: () => grid && wallsLayer(grid),
-    rooms: () => rooms.value && areasLayer(rooms.value),
+    rooms: () => rooms.value && together([areasLayer(rooms.value.areas), doorsLayer(rooms.value.doors)]),
     places: () => places.value && areasLayer(places.value.map(areaOfPlace)),
     words: () => wordsLayer(wordLines, choice.isByDensity),
     runs: () => runsLayer(runs, chosenRun),
@@ -106,6 +114,14 @@ export function useLayers(state: SiteState, grid: Grid | undefined): Layers {
     runs,
     busy: waiting.length ? `Loading ${waiting.map(([, title]) => title.toLowerCase()).join(", ")}…` : undefined,
     error: Object.values(parts).find(({ error }) => error !== undefined)?.error,
+  };
+}
+
+/** Several layers as one; the first that was hit counts. */
+function together(parts: Layer[]): Layer {
+  return {
+    draw: (drawing) => parts.forEach((part) => part.draw(drawing)),
+    pick: (point, radius_m) => parts.map((part) => part.pick?.(point, radius_m)).find(Boolean),
   };
 }
 
@@ -150,29 +166,26 @@ async function list<T>(state: SiteState, key: string, name: string, query: Recor
 function areaOfPlace(place: Schemas["Place"]): Area {
   const color = LABEL_COLORS[place.label] ?? "#888888";
   const note = `${place.length_m.toFixed(1)} m, ${Math.round(100 * place.confidence)} % of the passes agree`;
-  return { name: place.label, note, color, outline: place.outline, center: place.centre };
+  return { name: place.label, note, color, outline: place.outline, holes: [], center: place.centre };
 }
 
-/** A room as the server answers it, if it does. */
-interface RoomAnswer {
-  room?: number;
-  name?: string | null;
-  label?: string;
-  area_m2?: number;
-  outline?: { x: number; y: number }[];
-  centre?: { x: number; y: number };
+async function loadRooms(state: SiteState, key: string): Promise<RoomsShown> {
+  const { component } = state;
+  const rooms = await list<Schemas["Room"]>(state, key, "rooms", { component: String(component) });
+  // Both rooms of a door tell of it.
+  const doors = new Map(rooms.flatMap((room) => room.doors.map(({ position }) => [`${position.x} ${position.y}`, position] as const)));
+  return { areas: rooms.map(areaOfRoom), doors: [...doors.values()] };
 }
 
-async function loadRooms(state: SiteState, key: string): Promise<Area[]> {
-  const { map, site, component } = state;
-  if (!map || !key) return [];
-  const rooms = await getJson<{ items: RoomAnswer[] }>(`${sitePath(site)}/maps/${map.version}/rooms`, { component: String(component) });
-  return rooms.items.map((room, idx) => ({
-    name: room.name ?? room.label ?? `room ${room.room ?? idx}`,
-    note: room.area_m2 === undefined ? "" : `${room.area_m2.toFixed(1)} m²`,
+function areaOfRoom(room: Schemas["Room"], idx: number): Area {
+  const rings = room.geometry.type === "Polygon" ? room.geometry.coordinates : [];
+  const [outline = [], ...holes] = rings.map((ring) => ring.map(([x = 0, y = 0]) => ({ x, y })));
+  return {
+    name: room.name ?? `${room.label} ${room.id}`,
+    note: `${room.area_m2.toFixed(1)} m², ${many(room.doors.length, "door")}`,
     color: roomColor(idx),
-    outline: room.outline ?? [],
-    center: room.centre ?? { x: 0, y: 0 },
-  }));
+    outline,
+    holes,
+    center: room.centre,
+  };
 }
-

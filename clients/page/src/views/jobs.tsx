@@ -1,9 +1,8 @@
 // Builds and other long work of a site.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { api, fetchWithKey, hasRoute, refusalOf, sitePath } from "../api";
+import { api } from "../api";
 import type { Schemas } from "../api";
-import { useLoaded } from "../cell";
 import { useSite } from "../site";
 import { Act, Progress } from "../ui";
 
@@ -68,11 +67,9 @@ export function JobsView() {
 
 function JobLine({ job }: { job: Schemas["Job"] }) {
   const { site, reload } = useSite();
-  const canCancel = useLoaded(() => hasRoute("/v1/sites/{site}/jobs/{id}", "delete"), "").value ?? false;
-  const isOver = job.state === "done" || job.state === "failed";
+  const isOver = job.state !== "queued" && job.state !== "running";
   const cancel = async () => {
-    const answer = await fetchWithKey(sitePath(site, "jobs", job.id), { method: "DELETE" });
-    if (!answer.ok) throw await refusalOf(answer);
+    await api.delete("/v1/sites/{site}/jobs/{id}", { path: { site, id: job.id } });
     reload();
   };
   return (
@@ -82,9 +79,15 @@ function JobLine({ job }: { job: Schemas["Job"] }) {
           {job.kind} {job.id}
         </strong>
         <span class={`state ${job.state}`}>{job.state}</span>
-        {!isOver && canCancel && <Act act={cancel}>Cancel</Act>}
+        {!isOver && <Act act={cancel}>Cancel</Act>}
       </div>
-      {isOver ? <p class="soft">{job.error ?? job.detail}</p> : <Progress value={job.progress} label={`${Math.round(100 * job.progress)} % · ${job.detail}`} />}
+      {isOver ? <p class="soft">{job.error ?? job.detail}</p> : <Progress value={job.progress} label={`${Math.round(100 * job.progress)} % · ${job.detail}${left(job)}`} />}
     </>
   );
+}
+
+/** How long a job will still take, where that can be told. */
+function left({ left_s }: Schemas["Job"]): string {
+  if (typeof left_s !== "number") return "";
+  return left_s < 90 ? ` · about ${Math.ceil(left_s)} s left` : ` · about ${Math.round(left_s / 60)} min left`;
 }

@@ -1,7 +1,6 @@
 // The panel beside the map: what is shown, figures, downloads.
 
-import { hasRoute, save, sitePath } from "../api";
-import { useLoaded } from "../cell";
+import { save, sitePath } from "../api";
 import { CHANGE_COLORS, STATE_COLORS } from "../colors";
 import { addressOf, patch, usePlace } from "../place";
 import { useSite } from "../site";
@@ -13,7 +12,6 @@ import { RouteForm } from "./route";
 export function LayersView() {
   const { site, map, jobs } = useSite();
   const choice = useChoice();
-  const rooms = useLoaded(() => hasRoute("/v1/sites/{site}/maps/{version}/rooms", "get"), "");
   const running = jobs.find((job) => job.state === "running" || job.state === "queued");
   const toggle = (name: LayerName, isOn: boolean) => {
     const shown = LAYERS.map(([layer]) => layer).filter((layer) => (layer === name ? isOn : choice.shown.has(layer)));
@@ -32,7 +30,7 @@ export function LayersView() {
         <>
           <fieldset>
             <legend>Layers</legend>
-            {LAYERS.filter(([name]) => name !== "rooms" || rooms.value).map(([name, title]) => (
+            {LAYERS.map(([name, title]) => (
               <div key={name}>
                 <Tick label={title} isOn={choice.shown.has(name)} onChange={(isOn) => toggle(name, isOn)} />
                 {name === "matches" && choice.shown.has(name) && <MatchFilters />}
@@ -120,12 +118,19 @@ const FORMS = [
   ["picture.svg", "Picture (SVG)"],
   ["trajectory.tum", "Trajectories (TUM)"],
   ["graph.g2o", "Pose graph (g2o)"],
+  ["rooms.geojson", "Rooms and doors (GeoJSON)"],
 ] as const;
 
 function MapFigures() {
   const { site, map, component } = useSite();
   if (!map) return null;
   const { statistics } = map;
+  const prefix = `${site}-${map.version}-${component}-`;
+  const saved = (name: string) => {
+    // The YAML names its image, which lies beside it under the name that it was given here.
+    const edit = name === "grid.yaml" ? (text: string) => text.replace(/^image: .*$/m, `image: ${prefix}grid.pgm`) : undefined;
+    return save(`${sitePath(site)}/map/${name}?version=${map.version}&component=${component}`, prefix + name, edit);
+  };
   return (
     <>
       <h2>This version</h2>
@@ -144,7 +149,7 @@ function MapFigures() {
       <ul class="plainlist">
         {FORMS.map(([name, title]) => (
           <li key={name}>
-            <Act act={() => save(`${sitePath(site)}/map/${name}?version=${map.version}&component=${component}`, `${site}-${map.version}-${component}-${name}`)}>{title}</Act>
+            <Act act={() => saved(name)}>{title}</Act>
           </li>
         ))}
       </ul>

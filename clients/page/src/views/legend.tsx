@@ -47,6 +47,16 @@ export function Legend({ layers }: { layers: Layers }) {
           ))}
         </ul>
       )}
+      {has("rooms") && (
+        <ul>
+          <li>
+            <svg class="swatch" viewBox="0 0 18 12" aria-hidden="true">
+              <circle cx="9" cy="6" r="4.5" fill="currentColor" />
+            </svg>
+            door between rooms
+          </li>
+        </ul>
+      )}
       {(has("labels") || has("places")) && <Key colors={LABEL_COLORS} />}
       {has("changes") && <Key colors={CHANGE_COLORS} />}
     </details>

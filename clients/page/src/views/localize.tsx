@@ -3,16 +3,16 @@
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
 import { api, isStatus } from "../api";
 import type { Schemas } from "../api";
-import { travelOf, wireScan } from "../carmen/file";
-import type { Recording } from "../carmen/log";
 import { useAction } from "../cell";
 import { returnsOf } from "../geometry";
 import type { Pose } from "../geometry";
 import { guessesLayer } from "../map/layers";
 import type { Layer } from "../map/view";
 import { patch } from "../place";
+import { travelOf, wireScan } from "../recording";
+import type { Recording } from "../recording";
 import { useOverlay, useSite } from "../site";
-import { Alert, Choice, Progress, Tick, metres, percent } from "../ui";
+import { Alert, Choice, Progress, Tick, metres, probability } from "../ui";
 import { FilePicker, RecordingLine } from "./recordings";
 
 const SCANS_PER_BATCH = 15;
@@ -126,7 +126,7 @@ function momentLayers(recording: Recording, moment: Moment, component: number): 
     pose: guess.map_from_robot,
     covariance: guess.covariance,
     probability: guess.probability,
-    name: percent(guess.probability),
+    name: probability(guess.probability),
     ...(idx === 0 && { returns }),
   }));
   const track: Layer = {
@@ -165,12 +165,12 @@ function MomentView({ moment, recording, start }: { moment: Moment; recording: R
                 {guess.map_from_robot.x.toFixed(1)}, {guess.map_from_robot.y.toFixed(1)} m, component {guess.component}
                 <meter value={guess.probability} aria-label="probability" />
               </span>
-              <span class="num">{percent(guess.probability)}</span>
+              <span class="num">{probability(guess.probability)}</span>
             </button>
           </li>
         ))}
       </ol>
-      <p class="soft">Not in this map: {percent(session.probability_elsewhere)}</p>
+      <p class="soft">Not in this map: {probability(session.probability_elsewhere)}</p>
     </>
   );
 }

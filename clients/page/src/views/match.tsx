@@ -6,7 +6,7 @@ import type { Schemas } from "../api";
 import { useLoaded } from "../cell";
 import { addressOf, patch, usePlace } from "../place";
 import { componentOf, forget, keyOf, placeMatches, useSite } from "../site";
-import { Act, Alert, Figures, Go, degrees, metres, percent } from "../ui";
+import { Act, Alert, Figures, Go, degrees, metres, probability } from "../ui";
 import { evidenceText } from "./evidence";
 import { ScanOverlay } from "./overlay";
 
@@ -46,7 +46,7 @@ export function MatchView({ id }: { id: string }) {
       {shown && map && (
         <>
           <p>
-            <span class={`state ${shown.state}`}>{shown.state}</span> {percent(shown.probability)} sure
+            <span class={`state ${shown.state}`}>{shown.state}</span> {probability(shown.probability)} sure
             {shown.decision && <strong> · {shown.decision === "veto" ? "vetoed by a person" : "confirmed by a person"}</strong>}
           </p>
           <ScanOverlay match={shown} map={map} site={site} />

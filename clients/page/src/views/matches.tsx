@@ -5,7 +5,7 @@ import { useLoaded } from "../cell";
 import { STATE_COLORS } from "../colors";
 import { addressOf, patch, usePlace } from "../place";
 import { keyOf, matchesOf, useSite } from "../site";
-import { Alert, Choice, Go, Swatch, count, percent } from "../ui";
+import { Alert, Choice, Go, Swatch, count, probability } from "../ui";
 import { CHANNELS, STATES, filtered, useChoice } from "./chosen";
 import { CHANNEL_TITLES } from "./layers";
 import { MatchView } from "./match";
@@ -58,7 +58,7 @@ function MatchList() {
                   {match.decision ? ` · ${match.decision === "veto" ? "vetoed" : "confirmed"}` : ""}
                 </small>
               </span>
-              <span class="num">{percent(match.probability)}</span>
+              <span class="num">{probability(match.probability)}</span>
             </Go>
           </li>
         ))}

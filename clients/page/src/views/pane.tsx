@@ -1,6 +1,6 @@
 // The map itself: canvas, scale bar, legend, and what is clicked.
 
-import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useRef, useState } from "preact/hooks";
 import { useCell, useLoaded } from "../cell";
 import { Bounds } from "../geometry";
 import type { Point } from "../geometry";
@@ -37,7 +37,8 @@ export function MapPane() {
   const overlay = useCell(stage.overlay);
   const tool = useCell(stage.tool);
   useView(state, canvas, grid.value, { setScale, setPointer, setNote });
-  useEffect(() => {
+  // At once, since a key may be pressed before the next picture is drawn.
+  useLayoutEffect(() => {
     if (!stage.view) return;
     stage.view.layers = [...layers.layers, ...overlay];
     stage.view.tool = tool;

@@ -10,9 +10,9 @@ import type { Drive } from "../drives";
 import { Bounds, returnsOf } from "../geometry";
 import { drawArrow, drawReturns, wordsLayer } from "../map/layers";
 import { MapView } from "../map/view";
-import { addressOf, usePlace } from "../place";
-import { componentOf, useSite } from "../site";
-import { Alert, Figures, Go, count, degrees, metres } from "../ui";
+import { addressOf, go, usePlace } from "../place";
+import { componentOf, forget, useSite } from "../site";
+import { Alert, Confirm, Figures, Go, count, degrees, metres } from "../ui";
 import { DensityChart } from "./chart";
 import { OBSERVATION_M } from "./note";
 import { wordsText } from "./words";
@@ -51,7 +51,35 @@ export function RunView() {
           <DensityChart drive={live.value.drive} />
           <h2>Its text</h2>
           <Text drive={live.value.drive} />
+          <DeleteRun info={info} />
         </>
+      )}
+    </>
+  );
+}
+
+function DeleteRun({ info }: { info: Schemas["Run"] }) {
+  const { site, reload } = useSite();
+  const { query } = usePlace();
+  const [isAsking, setAsking] = useState(false);
+  const { run } = info;
+  const remove = async () => {
+    await api.delete("/v1/sites/{site}/runs/{run}", { path: { site, run } });
+    forget(`${site}/`);
+    reload();
+    go(["sites", site, "runs"], query);
+  };
+  return (
+    <>
+      <h2>Delete</h2>
+      <p class="soft">Its scans and its text are gone at once; the next map, which is built right away, does not hold it.</p>
+      <button type="button" class="danger" onClick={() => setAsking(true)}>
+        Delete this run…
+      </button>
+      {isAsking && (
+        <Confirm title={`Delete ${run}?`} word={run} verb="Delete it" act={remove} onClose={() => setAsking(false)}>
+          <p>{count(info.num_scans)} scans will be deleted. This cannot be undone.</p>
+        </Confirm>
       )}
     </>
   );

@@ -106,8 +106,8 @@ function Empty() {
         <h2>Or from the command line</h2>
         <p>Three simulated robots that map an office floor, on a server of their own:</p>
         <pre tabIndex={0}>locution demo</pre>
-        <p>Recordings of your own, as CARMEN logs:</p>
-        <pre tabIndex={0}>{`locution replay my-robot.log.gz --url ${location.origin} --site office --wait`}</pre>
+        <p>Recordings of your own, as bags of ROS or CARMEN logs:</p>
+        <pre tabIndex={0}>{`locution replay my-robot.mcap --url ${location.origin} --site office --wait`}</pre>
         <p>
           Robots send their scans over HTTP; the <a href="/docs/">API</a> says how.
         </p>

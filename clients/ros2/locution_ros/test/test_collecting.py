@@ -73,6 +73,20 @@ def test_a_clock_that_is_set_back_is_followed() -> None:
     assert ready.odom_from_robot.x == 1.5
 
 
+def answered(state: LocalizationState, num_scans: int, travel_m: float, found: list[Hypothesis]) -> Localization:
+    return Localization(
+        id="1",
+        map_version=3,
+        state=state,
+        next_sequence=num_scans,
+        travel_m=travel_m,
+        hypotheses=found,
+        expires_in_s=60.0,
+        probability_elsewhere=0.0,
+        missing=[],
+    )
+
+
 class Session:
     """A server that is sure after 20 scans."""
 
@@ -80,7 +94,7 @@ class Session:
         self.num_scans = 0
         self.is_closed = False
         self.fails = False
-        self.answer = Localization("1", 3, LocalizationState.LOST, 0, 0.0, [])
+        self.answer = answered(LocalizationState.LOST, 0, 0.0, [])
 
     def append(self, scans: list[Scan]) -> Localization:
         if self.fails:
@@ -91,7 +105,7 @@ class Session:
             Hypothesis(0, pose(5.0, 1.0, 1.0), [[0.01] * 3] * 3, 0.9),
             Hypothesis(0, pose(0, 0, 0), [[0.0] * 3] * 3, 0.1),
         ]
-        self.answer = Localization("1", 3, state, self.num_scans, 2.0, found)
+        self.answer = answered(state, self.num_scans, 2.0, found)
         return self.answer
 
     def close(self) -> None:

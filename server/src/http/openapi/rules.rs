@@ -48,6 +48,7 @@ pub(super) fn apply(document: &mut Node) {
         }
     }
     document.for_each_object(&mut bound_integer);
+    document.for_each_object(&mut bound_size);
     document.for_each_object(&mut size_covariance);
     let responses =
         PROBLEMS.iter().map(|(status, name, meaning)| ((*name).to_owned(), problem(status, meaning)));
@@ -193,6 +194,19 @@ fn bound_integer(schema: &mut Members) {
     schema.entry("maximum".into()).or_insert(node!(maximum));
 }
 
+/// Sizes and numbers of things, which have no format: nothing uses the highest bit.
+fn bound_size(schema: &mut Members) {
+    let kind = schema.get("type");
+    let is_integer = match kind {
+        Some(Node::List(kinds)) => kinds.iter().any(|kind| kind.as_str() == Some("integer")),
+        Some(kind) => kind.as_str() == Some("integer"),
+        None => false,
+    };
+    if is_integer && schema.get("format").is_none() {
+        schema.entry("maximum".into()).or_insert(node!(i64::MAX));
+    }
+}
+
 /// A covariance of (x, y, θ) has three rows of three.
 fn size_covariance(members: &mut Members) {
     let mut level = members.get_mut("covariance");
@@ -217,6 +231,7 @@ mod tests {
             "components": {"schemas": {"Pose": {"properties": {
                 "covariance": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}},
                 "count": {"type": "integer", "format": "u-int8"},
+                "size": {"type": ["integer", "null"], "minimum": 0},
             }}}},
         });
         apply(&mut document);
@@ -238,6 +253,7 @@ mod tests {
             (&members["count"]["format"], &members["count"]["maximum"]),
             (&"int32".into(), &255.into())
         );
+        assert_eq!(members["size"]["maximum"], i64::MAX);
         assert_eq!(members["covariance"]["items"]["minItems"], 3);
     }
 }

@@ -31,7 +31,7 @@ pub struct AnnotationParams {
     /// Only in this component.
     pub component: Option<u32>,
     /// Version of the map in which they are to be placed; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 

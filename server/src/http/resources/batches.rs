@@ -98,7 +98,6 @@ pub fn checked_batch(first_sequence: u64, scans: Vec<ScanDto>) -> Result<NewBatc
 pub struct BatchDto {
     /// Sequence number of the first scan; the first scan of a run has 0.
     #[schema(example = 0)]
-    #[serde(deserialize_with = "crate::http::whole::deserialize")]
     pub first_sequence: u64,
     /// In order.
     pub scans: Vec<ScanDto>,
@@ -196,6 +195,7 @@ pub struct ScanParams {
     #[param(inline)]
     pub frame: Option<FrameDto>,
     /// Version of the map, when the frame is `map`; the serving one unless said.
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 

@@ -23,7 +23,7 @@ pub struct ChangesParams {
     /// Runs of the second session, separated by commas; the latest run unless said.
     pub after: Option<String>,
     /// Version of the map; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 

@@ -24,19 +24,17 @@ pub struct NewKeyDto {
     #[schema(example = "robot-7")]
     pub name: String,
     /// `read`, `write` or `admin`.
-    #[schema(value_type = String, example = "write")]
     pub scope: Scope,
     /// Sites it may do it in; `*` means all.
     #[schema(example = json!(["office"]))]
     pub sites: Vec<String>,
     /// How long it is valid, seconds; for good unless said.
     #[schema(minimum = 1, maximum = 315_360_000)]
-    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub expires_in_s: Option<u64>,
     /// Most requests in a second, on average.
     pub requests_per_s_max: Option<f64>,
     /// Most localisations at once.
-    #[serde(rename = "num_localisations_max", default, deserialize_with = "crate::http::whole::optional")]
+    #[serde(rename = "num_localisations_max")]
     pub num_localizations_max: Option<usize>,
 }
 
@@ -46,7 +44,6 @@ pub struct KeyDto {
     /// Its name.
     pub name: String,
     /// What it may do.
-    #[schema(value_type = String, example = "write")]
     pub scope: Scope,
     /// Where.
     pub sites: Vec<String>,

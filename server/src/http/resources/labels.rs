@@ -41,7 +41,7 @@ pub struct LabelParams {
     #[param(pattern = "^-?[0-9.eE+-]+(,-?[0-9.eE+-]+){3}$", max_length = 200, example = "0,0,12.5,8")]
     pub area: Option<String>,
     /// Version of the map; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 
@@ -156,7 +156,6 @@ pub struct LabelQueryDto {
     pub labels: Vec<LabelPatternDto>,
     /// Most places to answer; 20 unless said.
     #[schema(minimum = 1, maximum = 1_000)]
-    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub limit: Option<usize>,
 }
 
@@ -224,10 +223,11 @@ pub async fn list_labels(
     Paged(params, page): Paged<LabelParams>,
 ) -> Result<Json<Page<LabelDto>>, ApiError> {
     let label: Option<PlaceLabelDto> = one_of("label", params.label.as_deref())?;
+    let run = params.run.as_deref().map(|run| Name::new(run, "run")).transpose()?;
     let window = window(params.from_ns, params.to_ns, params.area.as_deref())?;
     let mut labels = labels(&site.map(params.version).await?).await?;
     labels.retain(|driven| {
-        params.run.as_ref().is_none_or(|run| *run == driven.run)
+        run.as_ref().is_none_or(|run| run.as_str() == driven.run)
             && params.component.is_none_or(|component| component == driven.component)
             && label.is_none_or(|label| label == driven.stretch.label.into())
             && window.holds_time(driven.stretch.timestamps_ns)

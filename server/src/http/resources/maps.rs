@@ -17,7 +17,7 @@ use crate::records::{MapPose, MapRecord, MapRun, PlacedRun};
 #[serde(deny_unknown_fields)]
 pub struct MapParams {
     /// The version; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
     /// The component; for grids the first unless said, elsewhere all.
     pub component: Option<u32>,
@@ -29,7 +29,7 @@ pub struct MapParams {
 #[serde(deny_unknown_fields)]
 pub struct VersionParams {
     /// The version; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 

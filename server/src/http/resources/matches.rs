@@ -57,7 +57,7 @@ pub struct MatchParams {
     #[param(value_type = Option<MatchOrderDto>, inline)]
     pub sort: Option<String>,
     /// Version of the map; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 
@@ -122,6 +122,13 @@ impl MatchParams {
             DecisionFilterDto::Confirm => Some(true),
             DecisionFilterDto::None => None,
         });
+        for (name, bound) in
+            [("probability_min", self.probability_min), ("probability_max", self.probability_max)]
+        {
+            if bound.is_some_and(|bound| !(0.0..=1.0).contains(&bound)) {
+                return Err(ApiError::invalid(name, "a probability lies between 0 and 1"));
+            }
+        }
         let probability = (self.probability_min.is_some() || self.probability_max.is_some())
             .then(|| (self.probability_min.unwrap_or(0.0), self.probability_max.unwrap_or(1.0)));
         let window = window(self.from_ns, self.to_ns, self.area.as_deref())?;

@@ -62,7 +62,7 @@ pub struct RouteParams {
     #[serde(default)]
     pub component: u32,
     /// Version of the map; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 

@@ -19,6 +19,7 @@ use crate::http::geojson::{
     FeatureTypeDto, ShapeDto,
 };
 use crate::http::values::{Page, PageParams, PointDto};
+use crate::records::Shape;
 
 /// What a room is by its shape.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
@@ -164,8 +165,7 @@ fn features(
                 rooms: vec![door.rooms.0, door.rooms.1],
                 ..properties(FeatureKindDto::Door, of.component)
             };
-            let coordinates = [door.position.x, door.position.y];
-            features.push(feature(ShapeDto::Point { coordinates }, said));
+            features.push(feature(ShapeDto::from(&Shape::Point(door.position)), said));
         }
     }
     for placed in drawn {

@@ -25,16 +25,11 @@ use crate::state::AppState;
 pub struct GeometryDto {
     /// Readings per scan, at most the server's limit.
     #[schema(example = 180, minimum = 1, maximum = 8_192)]
-    #[serde(deserialize_with = "crate::http::whole::deserialize")]
     pub num_ranges: usize,
     /// Fewest readings of a scan, of a laser whose number varies; those missing at the end say nothing. As many as
     /// `num_ranges` unless said.
-    #[serde(
-        default,
-        skip_serializing_if = "Option::is_none",
-        deserialize_with = "crate::http::whole::optional"
-    )]
-    #[schema(example = 180, minimum = 1)]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schema(example = 180, minimum = 1, maximum = 8_192)]
     pub num_ranges_min: Option<usize>,
     /// Direction of the first beam in the laser's frame.
     #[schema(example = -1.5708)]

@@ -17,6 +17,7 @@ use crate::auth::Identity;
 use crate::elsewhere::Answers;
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, SiteName, SiteOf};
+use crate::http::as_documented::AsDocumented;
 use crate::http::values::{Page, PageParams};
 use crate::http::with_location;
 use crate::http::wording::plain;
@@ -283,24 +284,12 @@ pub async fn make_site(
 }
 
 fn parse_config(config: serde_json::Value) -> Result<EngineConfig, ApiError> {
-    let model = serde_json::to_value(EngineConfig::default()).map_err(AppError::internal)?;
-    if let Some(field) = section_that_is_none(&config, &model, "config") {
-        return Err(ApiError::malformed(format!("{field}: expected an object")).at(field));
-    }
-    serde_path_to_error::deserialize(config).map_err(|error| {
-        let field = format!("config.{}", error.path());
+    let parsed = serde_path_to_error::deserialize(config).map_err(|error| {
+        let path = error.path().to_string();
+        let field = if path == "." { "config".to_owned() } else { format!("config.{path}") };
         ApiError::malformed(format!("{field}: {}", plain(&error.inner().to_string()))).at(field)
-    })
-}
-
-/// The path of a section of the configuration that is given as something else than an object. A list would be read as
-/// the section's members in their order, which nobody means.
-fn section_that_is_none(given: &serde_json::Value, model: &serde_json::Value, path: &str) -> Option<String> {
-    let sections = model.as_object()?;
-    let Some(given) = given.as_object() else { return Some(path.to_owned()) };
-    given
-        .iter()
-        .find_map(|(name, value)| section_that_is_none(value, sections.get(name)?, &format!("{path}.{name}")))
+    });
+    parsed.map(|AsDocumented(config)| config)
 }
 
 /// All sites that the key may see.
@@ -353,7 +342,7 @@ pub async fn get_site(SiteOf(site): SiteOf) -> Result<Json<SiteDto>, ApiError> {
 
 /// Change a site's configuration or how much of it is kept. When there is a map, a build is queued that makes it accordingly.
 #[utoipa::path(patch, path = "/v1/sites/{site}", operation_id = "change_site", tag = "sites",
-    request_body = SiteChangeDto,
+    request_body = Option<SiteChangeDto>,
     responses((status = 200, description = "The site as it stands now", body = ChangedSiteDto)))]
 pub async fn change_site(
     State(state): State<AppState>,

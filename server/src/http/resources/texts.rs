@@ -128,7 +128,7 @@ pub struct ObservationParams {
     #[param(inline)]
     pub frame: Option<FrameDto>,
     /// Version of the map, when the frame is `map`; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
 }
 
@@ -176,7 +176,7 @@ pub struct TrajectoryParams {
     #[param(inline)]
     pub frame: FrameDto,
     /// Version of the map, when the frame is `map`; the serving one unless said.
-    #[serde(default, deserialize_with = "crate::http::values::version_number")]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
     /// Not before, nanoseconds.
     pub from_ns: Option<i64>,
@@ -187,9 +187,9 @@ pub struct TrajectoryParams {
     pub area: Option<String>,
     /// Most poses to answer; all unless said.
     #[param(minimum = 1)]
-    pub limit: Option<usize>,
+    pub limit: Option<u32>,
     /// `next_cursor` of the answer before.
-    #[param(minimum = 0)]
+    #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub cursor: Option<u64>,
 }
 
@@ -199,7 +199,7 @@ impl TrajectoryParams {
     /// # Errors
     /// 422 for a window that is none and a limit of zero.
     async fn poses(&self, site: &Site, run: &Run) -> Result<(Trajectory, Option<u64>), ApiError> {
-        let limit = self.limit.unwrap_or(usize::MAX);
+        let limit = self.limit.map_or(usize::MAX, |limit| limit as usize);
         if limit == 0 {
             return Err(ApiError::invalid("limit", "at least 1 pose"));
         }

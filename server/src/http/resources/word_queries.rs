@@ -25,11 +25,9 @@ const NUM_WORDS_MAX: usize = 64;
 pub struct WordPatternDto {
     /// d: density class.
     #[schema(example = 3)]
-    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub class: Option<u8>,
     /// s: number of observations.
     #[schema(example = 24)]
-    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub size: Option<u32>,
     /// How far the size may be off, as a share of the larger; 0.25 unless said.
     #[schema(minimum = 0, maximum = 1)]
@@ -51,7 +49,6 @@ pub struct WordQueryDto {
     pub words: Vec<WordPatternDto>,
     /// Most places to answer; 20 unless said.
     #[schema(minimum = 1, maximum = 1_000)]
-    #[serde(default, deserialize_with = "crate::http::whole::optional")]
     pub limit: Option<usize>,
 }
 

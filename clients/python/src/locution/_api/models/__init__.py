@@ -111,6 +111,7 @@ from .run_change import RunChange
 from .run_page import RunPage
 from .run_state import RunState
 from .scan import Scan
+from .scope import Scope
 from .shape_type_0 import ShapeType0
 from .shape_type_0_type import ShapeType0Type
 from .shape_type_1 import ShapeType1
@@ -248,6 +249,7 @@ __all__ = (
     "RunPage",
     "RunState",
     "Scan",
+    "Scope",
     "ShapeType0",
     "ShapeType0Type",
     "ShapeType1",

@@ -6,6 +6,7 @@ from typing import Any, TypeVar, cast
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..models.scope import Scope
 from ..types import UNSET, Unset
 
 T = TypeVar("T", bound="Key")
@@ -17,7 +18,7 @@ class Key:
 
     Attributes:
         name (str): Its name.
-        scope (str): What it may do. Example: write.
+        scope (Scope): What a key may do; each scope includes those before it.
         sites (list[str]): Where.
         is_configured (bool): Whether it stands in the server's configuration, where the API cannot change it.
         created_at_s (int | None | Unset): When it was made, seconds since 1970; null for keys of the configuration.
@@ -29,7 +30,7 @@ class Key:
     """
 
     name: str
-    scope: str
+    scope: Scope
     sites: list[str]
     is_configured: bool
     created_at_s: int | None | Unset = UNSET
@@ -42,7 +43,7 @@ class Key:
     def to_dict(self) -> dict[str, Any]:
         name = self.name
 
-        scope = self.scope
+        scope = self.scope.value
 
         sites = self.sites
 
@@ -106,7 +107,7 @@ class Key:
         d = dict(src_dict)
         name = d.pop("name")
 
-        scope = d.pop("scope")
+        scope = Scope(d.pop("scope"))
 
         sites = cast(list[str], d.pop("sites"))
 

@@ -5,6 +5,7 @@ from typing import Any, TypeVar, cast
 
 from attrs import define as _attrs_define
 
+from ..models.scope import Scope
 from ..types import UNSET, Unset
 
 T = TypeVar("T", bound="NewKey")
@@ -16,7 +17,7 @@ class NewKey:
 
     Attributes:
         name (str): 1 to 64 of `A–Z a–z 0–9 . _ -`; stands in the log. Example: robot-7.
-        scope (str): `read`, `write` or `admin`. Example: write.
+        scope (Scope): What a key may do; each scope includes those before it.
         sites (list[str]): Sites it may do it in; `*` means all. Example: ['office'].
         expires_in_s (int | None | Unset): How long it is valid, seconds; for good unless said.
         requests_per_s_max (float | None | Unset): Most requests in a second, on average.
@@ -24,7 +25,7 @@ class NewKey:
     """
 
     name: str
-    scope: str
+    scope: Scope
     sites: list[str]
     expires_in_s: int | None | Unset = UNSET
     requests_per_s_max: float | None | Unset = UNSET
@@ -33,7 +34,7 @@ class NewKey:
     def to_dict(self) -> dict[str, Any]:
         name = self.name
 
-        scope = self.scope
+        scope = self.scope.value
 
         sites = self.sites
 
@@ -78,7 +79,7 @@ class NewKey:
         d = dict(src_dict)
         name = d.pop("name")
 
-        scope = d.pop("scope")
+        scope = Scope(d.pop("scope"))
 
         sites = cast(list[str], d.pop("sites"))
 

@@ -16,7 +16,7 @@ class ShapeType0:
     """A position.
 
     Attributes:
-        coordinates (list[float]): x and y.
+        coordinates (list[float]): x and y, metres.
         type_ (ShapeType0Type):
     """
 

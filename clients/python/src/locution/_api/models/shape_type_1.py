@@ -13,10 +13,10 @@ T = TypeVar("T", bound="ShapeType1")
 
 @_attrs_define
 class ShapeType1:
-    """A line through positions.
+    """A line through at least two positions.
 
     Attributes:
-        coordinates (list[list[float]]): x and y of each; at least two.
+        coordinates (list[list[float]]): A line through at least two positions.
         type_ (ShapeType1Type):
     """
 

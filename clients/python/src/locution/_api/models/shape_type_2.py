@@ -13,11 +13,11 @@ T = TypeVar("T", bound="ShapeType2")
 
 @_attrs_define
 class ShapeType2:
-    """An area.
+    """An area: the outer border, counter-clockwise, then the holes, clockwise; the last position of each is its first.
 
     Attributes:
-        coordinates (list[list[list[float]]]): The outer border, counter-clockwise, then the holes, clockwise; the last
-            position of each is its first.
+        coordinates (list[list[list[float]]]): An area: the outer border, counter-clockwise, then the holes, clockwise;
+            the last position of each is its first.
         type_ (ShapeType2Type):
     """
 
