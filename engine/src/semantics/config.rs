@@ -12,9 +12,9 @@ use crate::config_error::ConfigError;
 #[serde(rename_all = "kebab-case")]
 pub enum LabelModel {
     /// Rules on passages, bends, driven ways and open discs, after the thesis' decision tree.
-    #[default]
     Tree,
     /// Trees learned from labelled buildings, and a hidden Markov chain along the run.
+    #[default]
     Learned,
 }
 

@@ -3,14 +3,17 @@
 //! ```text
 //! observations of one run ─► segments ─► decision tree                        the thesis' way
 //!
-//! runs at their poses in the map ─► blocks of occupancy ─► signature of each position ─► rules ─► labels
-//!                                   (what all runs saw)    (passages that leave it,       (all passes vote)
-//!                                                           bends, driven ways, halls)        │
-//!                                    routes, stretches of one label ◄─ places of the map ◄─┘
+//! runs at their poses in the map ─► blocks of occupancy ─► signature of each position ─► rules ────────┐
+//!                                   (what all runs saw)    (passages that leave it,                    │
+//!                                          │                bends, driven ways, halls)                 ├─► labels
+//!                                          └─► numbers of each position ─► learned trees ─► chain ─────┘ (all passes vote)
+//!                                              (turned maps give the same)              along the run       │
+//!                                    routes, stretches of one label ◄─ places of the map ◄──────────────────┘
 //! ```
-//! [`label_runs`] is the conductor of the second row; [`PlaceMap`] holds what becomes of it, and [`MapLabels`] does both
-//! for every component of a map. [`find_rooms`] needs no run: it divides a served grid into rooms and doors, which
-//! [`MapRooms`] numbers through all versions of a map. [`Anchor`]s tie what a person draws to the keyframes around it.
+//! [`label_runs`] is the conductor of the second row, [`LabelModel`] chooses who decides; [`PlaceMap`] holds what becomes
+//! of it, and [`MapLabels`] does both for every component of a map. [`find_rooms`] needs no run: it divides a served grid
+//! into rooms and doors, which [`MapRooms`] numbers through all versions of a map. [`Anchor`]s tie what a person draws to
+//! the keyframes around it.
 
 mod anchors;
 mod block;

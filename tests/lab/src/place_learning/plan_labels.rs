@@ -341,3 +341,49 @@ fn doors(rooms: &[u32], label: &[Option<PlaceLabel>], width: usize, origin: Poin
     }
     doors
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A corridor east with one north from its middle that turns west, and a room beside it; cells of a tenth of a meter.
+    fn plan() -> (Vec<u32>, usize) {
+        let number = |x: f64, y: f64| {
+            let is_corridor = (2.0..38.0).contains(&x) && (10.0..12.0).contains(&y)
+                || (19.0..21.0).contains(&x) && (10.0..32.0).contains(&y)
+                || (2.0..21.0).contains(&x) && (30.0..32.0).contains(&y);
+            let is_room = (30.0..35.0).contains(&x) && (5.0..10.0).contains(&y);
+            if is_corridor { 5 } else { u32::from(is_room) }
+        };
+        let center = |index: usize| (index as f64 + 0.5) * 0.1;
+        ((0..400 * 400).map(|cell| number(center(cell % 400), center(cell / 400))).collect(), 400)
+    }
+
+    #[test]
+    fn crossings_and_turns_reach_half_a_width_into_their_arms() {
+        let (rooms, width) = plan();
+        let mut labels = PlanLabels::new("ipa-freiburg52", &rooms, width, 0.1, Point2::default()).unwrap();
+        let mut at = |x, y| labels.label_at(&Point2::new(x, y));
+        assert_eq!(at(20.0, 11.0), Some(PlaceLabel::Bifurcation));
+        assert_eq!(at(18.4, 11.0), Some(PlaceLabel::Bifurcation));
+        assert_eq!(at(16.0, 11.0), Some(PlaceLabel::Corridor));
+        assert_eq!(at(20.0, 31.0), Some(PlaceLabel::Corner));
+        assert_eq!(at(18.5, 31.0), Some(PlaceLabel::Corner));
+        assert_eq!(at(15.0, 31.0), Some(PlaceLabel::Corridor));
+        assert_eq!(at(32.0, 7.0), Some(PlaceLabel::DeadEnd));
+        assert_eq!(at(5.0, 20.0), None);
+    }
+
+    #[test]
+    fn shut_doors_are_wall() {
+        let (rooms, width) = plan();
+        let is_free = rooms.iter().map(|room| *room != 0).collect();
+        let world = World::new(width, 400, 0.1, Point2::default(), is_free).unwrap();
+        let mut labels = PlanLabels::new("ipa-freiburg52", &rooms, width, 0.1, Point2::default()).unwrap();
+        let door = Point2::new(32.5, 9.95);
+        assert!(labels.shut_doors(&world, 0.0, 1).unwrap().is_free(&door));
+        let shut = labels.shut_doors(&world, 1.0, 1).unwrap();
+        assert!(!shut.is_free(&door) && shut.is_free(&Point2::new(32.0, 7.0)));
+        assert!(labels.widest_in(&shut).is_some_and(|start| (10.0..32.0).contains(&start.y)));
+    }
+}
