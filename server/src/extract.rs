@@ -167,6 +167,28 @@ impl FromRequestParts<AppState> for RunName {
     }
 }
 
+/// The name of a channel in the path, which need not exist.
+pub struct ChannelName(pub Name);
+
+impl FromRequestParts<AppState> for ChannelName {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
+        path_name(parts, state, "channel").await.map(Self)
+    }
+}
+
+/// The name of a robot in the path.
+pub struct RobotName(pub Name);
+
+impl FromRequestParts<AppState> for RobotName {
+    type Rejection = ApiError;
+
+    async fn from_request_parts(parts: &mut Parts, state: &AppState) -> Result<Self, ApiError> {
+        path_name(parts, state, "robot").await.map(Self)
+    }
+}
+
 /// A number in the path, such as that of a match or a job.
 pub struct IdOf(pub u64);
 

@@ -116,6 +116,14 @@ const ROUTES: &[(&str, &str, Option<Scope>)] = &[
     ("GET", "/v1/sites/{site}/annotations/{id}", Some(Scope::Read)),
     ("PUT", "/v1/sites/{site}/annotations/{id}", Some(Scope::Write)),
     ("DELETE", "/v1/sites/{site}/annotations/{id}", Some(Scope::Write)),
+    ("GET", "/v1/sites/{site}/channels", Some(Scope::Read)),
+    ("GET", "/v1/sites/{site}/channels/{channel}", Some(Scope::Read)),
+    ("PUT", "/v1/sites/{site}/channels/{channel}", Some(Scope::Admin)),
+    ("DELETE", "/v1/sites/{site}/channels/{channel}", Some(Scope::Admin)),
+    ("POST", "/v1/sites/{site}/channels/{channel}/rollback", Some(Scope::Admin)),
+    ("GET", "/v1/sites/{site}/channels/{channel}/robots", Some(Scope::Read)),
+    ("PUT", "/v1/sites/{site}/channels/{channel}/robots/{robot}", Some(Scope::Write)),
+    ("GET", "/v1/sites/{site}/map/map.mcap", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/changes", Some(Scope::Read)),
     ("POST", "/v1/queries/example", Some(Scope::Read)),
 ];
@@ -140,7 +148,9 @@ async fn every_route_asks_every_key_for_what_it_needs() {
                 .replace("{site}", site)
                 .replace("{run}", run)
                 .replace("{id}", "1")
-                .replace("{key}", "k");
+                .replace("{key}", "k")
+                .replace("{channel}", "c")
+                .replace("{robot}", "r7");
             let shown = &document["paths"][route][method.to_lowercase()]["security"];
             let shown_scope = shown.as_array().unwrap().iter().find_map(|row| row["key"][0].as_str());
             assert_eq!(shown_scope, needed.map(Scope::as_str), "{method} {path}");

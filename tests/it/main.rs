@@ -6,6 +6,7 @@ mod anew;
 mod bad_input;
 mod batches;
 mod changes;
+mod channels;
 mod crash;
 mod damage;
 mod disk_full;

@@ -53,7 +53,8 @@ async fn a_map_is_served_in_every_form_under_its_version() {
     let known = [("if-none-match", listed.as_str())];
     let again = api.send(reqwest::Method::GET, "/v1/sites/a/map", &known, vec![]).await.unwrap();
     assert_eq!(again.status, 304);
-    let forms: [(&str, &[u8]); 7] = [
+    let forms: [(&str, &[u8]); 8] = [
+        ("map.mcap", b"\x89MCAP0\r\n"),
         ("grid.png", b"\x89PNG"),
         ("grid.pgm", b"P5\n"),
         ("grid.yaml", b"image: grid.pgm\n"),
@@ -71,6 +72,20 @@ async fn a_map_is_served_in_every_form_under_its_version() {
     let grid = api.get("/v1/sites/a/map/grid").await.ok();
     let num_cells = grid["info"]["width"].as_u64().unwrap() * grid["info"]["height"].as_u64().unwrap();
     assert_eq!(grid["data"].as_array().unwrap().len() as u64, num_cells);
+    assert_eq!(grid["header"]["frame_id"], "map");
+    let corner = &grid["info"]["origin"];
+    assert_eq!((&corner["orientation"]["w"], &corner["position"]["z"]), (&json!(1.0), &json!(0.0)));
+    let (x, y) = (corner["position"]["x"].as_f64().unwrap(), corner["position"]["y"].as_f64().unwrap());
+    let area = format!("{},{},{},{}", x + 1.01, y + 0.51, x + 2.49, y + 0.99);
+    let window = api.get(&format!("/v1/sites/a/map/grid?area={area}")).await.ok();
+    assert_eq!((&window["info"]["width"], &window["info"]["height"]), (&json!(30), &json!(10)));
+    let width = grid["info"]["width"].as_u64().unwrap() as usize;
+    assert_eq!(window["data"][0], grid["data"][10 * width + 20]);
+    api.get("/v1/sites/a/map/grid.png?area=900,900,901,901").await.problem(422, "invalid-value");
+    let named = api.get("/v1/sites/a/map/grid.yaml?component=0").await;
+    assert!(named.text().starts_with("image: grid-0.pgm\n"), "{}", named.text());
+    let picture = api.get("/v1/sites/a/map/grid.pgm?component=0").await;
+    assert_eq!(picture.headers["content-disposition"], "inline; filename=\"grid-0.pgm\"");
     api.get("/v1/sites/a/map/grid?component=7").await.problem(404, "not-found");
     api.get("/v1/sites/a/map?version=2").await.problem(404, "not-found");
     let trajectory = api.get("/v1/sites/a/runs/r/trajectory?frame=map").await.ok();

@@ -28,6 +28,9 @@ export const CHANNEL_DASHES: Record<string, number[]> = { spatial: [], words: [7
 /** Colors of rooms, in turn; light, since they lie under everything. */
 export const ROOM_COLORS = ["#56b4e9", "#e69f00", "#009e73", "#cc79a7", "#785ef0", "#a39400", "#d55e00", "#0072b2"];
 
+/** What people drew. */
+export const ANNOTATION_COLOR = "#b5179e";
+
 export const CHANGE_COLORS: Record<string, string> = { appeared: "#d55e00", disappeared: "#0072b2" };
 
 /** The color of a class; a partition may have more classes than colors. */

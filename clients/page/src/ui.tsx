@@ -79,6 +79,22 @@ export function Field(props: { label: string; hint?: string; isHidden?: boolean 
   );
 }
 
+/** A field whose text counts when it is left; what is typed stays while the rest of the page is drawn anew. */
+export function LazyField({ value, onCommit, ...rest }: { label: string; hint?: string; value: string; onCommit: (text: string) => void } & Omit<JSX.IntrinsicElements["input"], "value" | "label">) {
+  const [draft, setDraft] = useState<string | undefined>();
+  return (
+    <Field
+      {...rest}
+      value={draft ?? value}
+      onInput={(event) => setDraft(event.currentTarget.value)}
+      onChange={(event) => {
+        setDraft(undefined);
+        onCommit(event.currentTarget.value);
+      }}
+    />
+  );
+}
+
 /** A labeled choice. */
 export function Choice(props: {
   label: string;

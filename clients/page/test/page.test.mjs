@@ -4,10 +4,9 @@
 import assert from "node:assert/strict";
 import { tmpdir } from "node:os";
 import { after, before, test as nodeTest } from "node:test";
-import { copyFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
-import { mcapFile, mcapOfLog, rosbagFile } from "./bags.mjs";
-import { ask, assertAccessible, assertFits, assertReadable, colorsOf, folder, join, picture, readFileSync, recording, run, startBrowser, startServer, until, writeFileSync } from "./surroundings.mjs";
+import { mcapOfLog } from "./bags.mjs";
+import { ask, assertAccessible, assertFits, assertReadable, colorsOf, folder, join, picture, readFileSync, recording, startBrowser, startServer, until, writeFileSync } from "./surroundings.mjs";
 
 const world = process.env.PAGE_WORLD;
 const PHONE = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true, deviceScaleFactor: 2 };
@@ -78,62 +77,6 @@ test("recordings are sent from the browser and become a map", async () => {
   await until(async () => (await colorsOf(page, ".pane canvas")) > 3, "walls are drawn");
 });
 
-test("the browser reads recordings as the command line does", async () => {
-  // Of both messages, with and without what old logs get wrong: carriage returns, a mark, codes for no return.
-  const flaser = (t, ranges) => `FLASER ${ranges.length} ${ranges.join(" ")} ${0.1 * t} 0.05 0.01 ${0.1 * t} 0 0.01 ${1000 + t}.123456789 host ${t}`;
-  const robot = (t, ranges) => `ROBOTLASER1 0 -1.5707963 3.1415927 0.0174533 81.83 0.01 0 ${ranges.length} ${ranges.join(" ")} 0 ${0.1 * t + 0.2} 0.1 ${3.1 + 0.001 * t} ${0.1 * t} 0.1 ${3.1 + 0.001 * t} 0 0 0.3 0.2 1e6 ${t}.5e0 host ${t}`;
-  const ranges = (count, t) => Array.from({ length: count }, (_, beam) => (beam % 7 === 0 ? "81.83" : beam % 31 === 3 ? "-1" : beam % 37 === 5 ? "nan" : (1 + ((beam * 7919 + t * 104729) % 9973) * 1e-3).toFixed(4)));
-  const lines = { flaser: ["PARAM laser_front_laser_fov 239.77 h 0", "PARAM laser_front_laser_resolution 0.3516 h 0"], robot: ["\ufeff# a note \u00e9"] };
-  for (let t = 0; t < 60; t++) {
-    lines.flaser.push(`${flaser(t, ranges(683, t))}\r`, "ODOM 0 0 0 0 0 0 0 host 0");
-    lines.robot.push(robot(t, ranges(181, t)));
-  }
-  for (const [name, text] of Object.entries(lines)) writeFileSync(join(folder, `${name}.log`), text.join("\n") + "\n");
-  // Bags of both ROS, plain, packed with LZ4, and packed with zstd by the writer of the Python client's `make_bag.py`.
-  writeFileSync(join(folder, "plain.mcap"), mcapFile());
-  writeFileSync(join(folder, "lz4.bag"), rosbagFile());
-  copyFileSync(new URL("recordings/zstd.mcap", import.meta.url), join(folder, "zstd.mcap"));
-  const files = ["flaser.log", "robot.log", "guest.log", "plain.mcap", "lz4.bag", "zstd.mcap"].map((name) => join(folder, name));
-  run("replay", "--url", server.direct, "--site", "by-command", ...files);
-  await visit("");
-  await page.getByLabel("Name of the site").fill("by-browser");
-  await page.getByRole("button", { name: "Make the site" }).click();
-  await page.getByLabel("Recordings", { exact: true }).setInputFiles(files);
-  await page.getByText("laser hangs upside down").first().waitFor();
-  await page.getByRole("button", { name: "Send 6 runs" }).click();
-  await page.getByText("Sent. The map is being built").waitFor();
-  // Angles of bags come from quaternions, and browsers have another arc tangent in the last bit.
-  const rounded = (text) => text.replace(/("theta": ?)(-?[0-9.e-]+)/g, (_, key, theta) => key + Number(theta).toFixed(12));
-  for (const name of ["flaser", "robot", "guest", "plain", "lz4", "zstd"]) {
-    const isBag = !["flaser", "robot", "guest"].includes(name);
-    const [command, browser] = await Promise.all(["by-command", "by-browser"].map(async (site) => ({
-      geometry: (await ask(server.direct, `/v1/sites/${site}/runs/${name}`)).geometry,
-      // As text: a number of JavaScript would hide a nanosecond.
-      scans: await (await fetch(`${server.direct}/v1/sites/${site}/runs/${name}/scans?limit=10000`)).text(),
-    })));
-    const same = (a, b, what) => assert(isBag ? rounded(a) === rounded(b) : a === b, `${name}: ${what}`);
-    same(JSON.stringify(browser.geometry), JSON.stringify(command.geometry), "the laser");
-    same(browser.scans, command.scans, "every scan to the last bit");
-  }
-});
-
-test("a file that is no recording is refused with the line", async () => {
-  writeFileSync(join(folder, "odd.log"), "FLASER 3 1 2\n");
-  await page.getByLabel("Recordings", { exact: true }).setInputFiles(join(folder, "odd.log"));
-  await page.getByRole("alert").filter({ hasText: "odd.log: line 1: the line ends before reading 2" }).waitFor();
-  writeFileSync(join(folder, "cut.mcap"), readFileSync(join(folder, "plain.mcap")).subarray(0, -2000));
-  await page.getByLabel("Recordings", { exact: true }).setInputFiles(join(folder, "cut.mcap"));
-  await page.getByRole("alert").filter({ hasText: "cut.mcap: the file is cut off" }).waitFor();
-  await page.getByText("If a file is not read as it should be").click();
-  await page.getByLabel(/damaged or cut off/).check();
-  await page.getByLabel("Topic of the laser").fill("/nose");
-  await page.getByRole("button", { name: "Read again" }).click();
-  await page.getByRole("alert").filter({ hasText: "no laser topic /nose; the bag has /scan" }).waitFor();
-  await page.getByLabel("Topic of the laser").fill("");
-  await page.getByRole("button", { name: "Read again" }).click();
-  await page.getByText("the file is cut off; what follows is left out").waitFor();
-});
-
 test("the map is moved, and its address brings one back", async () => {
   await visit("#/sites/office/map");
   const canvas = page.locator(".pane canvas");
@@ -187,6 +130,45 @@ test("a map is taken along for nav2, its picture under the name that its YAML sa
   assert.equal(picture.bytes.subarray(0, 2).toString(), "P5");
   const rooms = JSON.parse((await saved("Rooms and doors (GeoJSON)")).bytes.toString());
   assert.equal(rooms.type, "FeatureCollection");
+});
+
+test("a room is named, and a thing put onto the map and taken away", async () => {
+  const rooms = async () => (await ask(server.direct, "/v1/sites/office/rooms?limit=1000")).items;
+  const room = (await rooms()).reduce((a, b) => (a.area_m2 > b.area_m2 ? a : b));
+  const canvas = page.locator(".pane canvas");
+  const pressEnterAt = async ({ x, y }, layers) => {
+    await page.goto("about:blank");
+    await visit(`#/sites/office/map?layers=${layers}&at=${x},${y},60`);
+    await until(async () => (await colorsOf(page, ".pane canvas")) > 3 && (await page.locator(".note").count()) === 0, "the layers are drawn");
+    await canvas.focus();
+    await page.keyboard.press("Enter");
+  };
+  await pressEnterAt(room.centre, "walls,rooms");
+  await page.getByLabel("What people call it").fill("Great hall");
+  await page.getByRole("button", { name: "Name it" }).click();
+  await until(async () => (await rooms()).some(({ id, name }) => id === room.id && name === "Great hall"), "the room has its name");
+  // Another name replaces the first.
+  await pressEnterAt(room.centre, "walls,rooms");
+  await page.locator(".note strong").getByText("Great hall").waitFor();
+  await page.getByLabel("What people call it").fill("Small hall");
+  await page.getByRole("button", { name: "Name it" }).click();
+  await until(async () => (await rooms()).some(({ id, name }) => id === room.id && name === "Small hall"), "the room has its other name");
+  const annotations = async () => (await ask(server.direct, "/v1/sites/office/annotations")).items.map(({ kind, name }) => `${kind} ${name}`);
+  assert.deepEqual(await annotations(), ["room Small hall"]);
+  await page.getByRole("checkbox", { name: "Annotations" }).check();
+  await page.getByLabel("What people call it").fill("Charger");
+  await page.getByRole("button", { name: "Set place" }).click();
+  await page.getByText("Click the map; or focus it").waitFor();
+  await canvas.focus();
+  for (const key of ["ArrowLeft", "Enter"]) await page.keyboard.press(key);
+  await assertAccessible(page, "annotations");
+  await page.getByRole("button", { name: "Add it" }).click();
+  await until(async () => (await annotations()).includes("dock Charger"), "the dock is there");
+  await until(async () => (await page.locator(".note").count()) === 0, "it is shown");
+  await canvas.focus();
+  await page.keyboard.press("Enter");
+  await page.getByRole("button", { name: "Delete Charger" }).click();
+  await until(async () => !(await annotations()).includes("dock Charger"), "the dock is gone");
 });
 
 test("a word that is clicked asks where else it reads like this", async () => {
@@ -402,6 +384,7 @@ test("in the dark everything can be read, too", async () => {
 });
 
 test("a site is deleted only when its name is typed", async () => {
+  await ask(server.direct, "/v1/sites/by-browser", { method: "PUT", headers: { "content-type": "application/json" }, body: "{}" });
   await visit("#/sites/by-browser/manage");
   await page.getByRole("button", { name: "Delete this site…" }).click();
   const dialog = page.getByRole("dialog");

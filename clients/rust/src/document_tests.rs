@@ -83,13 +83,13 @@ fn bodies_have_every_member_of_the_document() {
         )*};
     }
     check! {
-        Annotation Change ChangeKind ChangeVisit ChangedSite Channel Component Connection ConnectionKind DecisionKind Direction Door Event
-        Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridInfo Hypothesis Interval IssuedKey Job JobKind
+        Annotation Change ChangeKind ChangeVisit ChangedSite Channel ChannelMove ChannelRobot ChannelTarget Component Connection ConnectionKind DecisionKind Direction Door Event
+        Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridHeader GridInfo Hypothesis Interval IssuedKey Job JobKind
         JobState Key Keys KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
-        MapRun MapStatistics Match MatchState Missing NewAnnotation NewKey NewLocalization NewRun Observation Place PlaceLabel Point
+        MapChannel MapRun MapStatistics Match MatchState Missing NewAnnotation NewKey NewLocalization NewRun Observation Place PlaceLabel Point
         Pose PosePrior Receipt Region Registration RejectionReason Retention Room RoomLabel Route RouteStep RouteTurn Run
         RunChange RunState Scan Shape Site SiteChange SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word
-        WordAnswer WordId WordPattern WordQuery
+        RobotReport RosPoint RosPose RosQuaternion RosTime Scope VdaMap WordAnswer WordId WordPattern WordQuery
     }
     assert_complete::<error::Problem>(&document, "Problem");
     // Bodies that only this crate writes, and the wrappers of lists.
@@ -105,6 +105,7 @@ fn bodies_have_every_member_of_the_document() {
         "FeatureProperties",
         "FeatureType",
         "NewSite",
+        "Position",
         "Problem",
         "Ranges",
     ];

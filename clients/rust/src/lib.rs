@@ -25,6 +25,7 @@
 #![cfg_attr(test, allow(clippy::unwrap_used))]
 
 mod annotations;
+mod channels;
 mod client;
 mod error;
 mod events;

@@ -31,8 +31,10 @@ pub enum MapForm {
     GridYaml,
     /// The pose graph.
     GraphG2o,
-    /// Poses of all scans of all runs in the TUM format.
+    /// Poses of all scans of all runs of a component in the TUM format.
     TrajectoryTum,
+    /// Grid and trajectories as MCAP, for Foxglove.
+    Mcap,
     /// Walls, runs and matches, drawn.
     PicturePng,
     /// The same as vectors.
@@ -49,6 +51,7 @@ impl MapForm {
             Self::GridYaml => &routes::GET_GRID_YAML,
             Self::GraphG2o => &routes::GET_GRAPH_G2O,
             Self::TrajectoryTum => &routes::GET_MAP_TUM,
+            Self::Mcap => &routes::GET_MAP_MCAP,
             Self::PicturePng => &routes::GET_PICTURE_PNG,
             Self::PictureSvg => &routes::GET_PICTURE_SVG,
             Self::RoomsGeoJson => &routes::GET_ROOMS_GEOJSON,

@@ -107,6 +107,7 @@ routes! {
     GET_GRID_PNG "get_grid_png" GET "/v1/sites/{site}/map/grid.png";
     GET_GRID_YAML "get_grid_yaml" GET "/v1/sites/{site}/map/grid.yaml";
     GET_GRAPH_G2O "get_graph_g2o" GET "/v1/sites/{site}/map/graph.g2o";
+    GET_MAP_MCAP "get_map_mcap" GET "/v1/sites/{site}/map/map.mcap";
     GET_MAP_TUM "get_map_tum" GET "/v1/sites/{site}/map/trajectory.tum";
     GET_PICTURE_PNG "get_picture_png" GET "/v1/sites/{site}/map/picture.png";
     GET_PICTURE_SVG "get_picture_svg" GET "/v1/sites/{site}/map/picture.svg";
@@ -131,6 +132,13 @@ routes! {
     GET_ANNOTATION "get_annotation" GET "/v1/sites/{site}/annotations/{id}";
     CHANGE_ANNOTATION "change_annotation" PUT "/v1/sites/{site}/annotations/{id}";
     DELETE_ANNOTATION "delete_annotation" DELETE "/v1/sites/{site}/annotations/{id}";
+    LIST_CHANNELS "list_channels" GET "/v1/sites/{site}/channels";
+    GET_CHANNEL "get_channel" GET "/v1/sites/{site}/channels/{channel}";
+    MOVE_CHANNEL "move_channel" PUT "/v1/sites/{site}/channels/{channel}";
+    DELETE_CHANNEL "delete_channel" DELETE "/v1/sites/{site}/channels/{channel}";
+    ROLL_BACK_CHANNEL "roll_back_channel" POST "/v1/sites/{site}/channels/{channel}/rollback";
+    LIST_CHANNEL_ROBOTS "list_channel_robots" GET "/v1/sites/{site}/channels/{channel}/robots";
+    REPORT_CHANNEL_ROBOT "report_channel_robot" PUT "/v1/sites/{site}/channels/{channel}/robots/{robot}";
     LIST_CHANGES "list_changes" GET "/v1/sites/{site}/changes";
     GET_HEALTH "get_health" GET "/healthz";
     GET_READINESS "get_readiness" GET "/readyz";

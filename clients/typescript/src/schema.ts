@@ -304,6 +304,93 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/channels": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Channels of a site, by name. */
+        get: operations["list_channels"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/channels/{channel}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** One channel: the version of the map by which robots that follow it drive. */
+        get: operations["get_channel"];
+        /** Point a channel to a version of the map; made when there is none of this name. The version is kept while it points there. */
+        put: operations["move_channel"];
+        post?: never;
+        /** Forget a channel; the versions that it held are kept no longer than others. */
+        delete: operations["delete_channel"];
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/channels/{channel}/robots": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /** Robots that follow a channel, and which version each has. */
+        get: operations["list_channel_robots"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/channels/{channel}/robots/{robot}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        /** Say which version of the map a robot has loaded. */
+        put: operations["report_channel_robot"];
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/channels/{channel}/rollback": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /** Take the last move of a channel back. */
+        post: operations["roll_back_channel"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/events": {
         parameters: {
             query?: never;
@@ -458,7 +545,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The pose graph in g2o's format. */
+        /** The pose graph of a component, the first unless said, in g2o's format. */
         get: operations["get_graph_g2o"];
         put?: never;
         post?: never;
@@ -475,7 +562,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** The occupancy grid of a component, with the fields of `nav_msgs/OccupancyGrid`. */
+        /** The occupancy grid of a component, the first unless said, field by field a `nav_msgs/OccupancyGrid`. */
         get: operations["get_grid"];
         put?: never;
         post?: never;
@@ -528,6 +615,26 @@ export interface paths {
         };
         /** What `map_server` wants to know of the PGM. */
         get: operations["get_grid_yaml"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/v1/sites/{site}/map/map.mcap": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A component of the map, the first unless said, as MCAP for Foxglove: `foxglove.Grid` on `/map`, and of every run
+         *     `foxglove.PosesInFrame` on `/runs/RUN/path` and `foxglove.PoseInFrame` on `/runs/RUN/pose`.
+         */
+        get: operations["get_map_mcap"];
         put?: never;
         post?: never;
         delete?: never;
@@ -594,7 +701,7 @@ export interface paths {
             path?: never;
             cookie?: never;
         };
-        /** Poses of all scans of all runs in TUM's format. */
+        /** Poses of all scans of all runs of a component, the first unless said, in TUM's format. */
         get: operations["get_map_tum"];
         put?: never;
         post?: never;
@@ -1026,6 +1133,53 @@ export interface components {
          * @enum {string}
          */
         Channel: "words" | "profile" | "spatial";
+        /** @description One move of a channel. */
+        ChannelMove: {
+            /**
+             * Format: int64
+             * @description Where it points since.
+             */
+            map_version: number;
+            /**
+             * Format: int64
+             * @description When it was moved, seconds since 1970.
+             */
+            at_s: number;
+            /** @description Name of the key that moved it. */
+            by: string;
+        };
+        /** @description A robot that follows a channel. */
+        ChannelRobot: {
+            /** @description Its name. */
+            robot: string;
+            /**
+             * Format: int64
+             * @description The version that it said to have.
+             */
+            map_version: number;
+            /** @description Whether the channel points there. */
+            is_current: boolean;
+            /**
+             * Format: int64
+             * @description When it said so, seconds since 1970.
+             */
+            at_s: number;
+        };
+        /** @description Part of a list. */
+        ChannelRobotPage: {
+            /** @description In order. */
+            items: components["schemas"]["ChannelRobot"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
+        };
+        /** @description Where a channel is to point. */
+        ChannelTarget: {
+            /**
+             * Format: int64
+             * @description A version of the map that is kept; the serving one unless said.
+             */
+            map_version?: number | null;
+        };
         /**
          * @description `FeatureCollection`, as GeoJSON calls it.
          * @enum {string}
@@ -1371,15 +1525,26 @@ export interface components {
             /** @description Where the laser sits on the robot; at its centre looking ahead unless said. */
             robot_from_laser?: components["schemas"]["Pose"];
         };
-        /** @description An occupancy grid with the field names of `nav_msgs/OccupancyGrid`. */
+        /** @description An occupancy grid, field by field a message of `nav_msgs/OccupancyGrid`. */
         Grid: {
+            /** @description Whose it is. */
+            header: components["schemas"]["GridHeader"];
             /** @description Where and how large. */
             info: components["schemas"]["GridInfo"];
             /** @description Row by row from the lower left: 0 free, 100 occupied, −1 unknown. */
             data: number[];
         };
+        /** @description `std_msgs/Header`. */
+        GridHeader: {
+            /** @description 0, as of a map that holds at all times. */
+            stamp: components["schemas"]["RosTime"];
+            /** @description `map`. */
+            frame_id: string;
+        };
         /** @description `nav_msgs/MapMetaData`. */
         GridInfo: {
+            /** @description 0: the server does not know when it is loaded. */
+            map_load_time: components["schemas"]["RosTime"];
             /**
              * Format: double
              * @description Metres per cell.
@@ -1390,7 +1555,7 @@ export interface components {
             /** @description Cells. */
             height: number;
             /** @description Pose of the lower left corner. */
-            origin: components["schemas"]["Pose"];
+            origin: components["schemas"]["RosPose"];
         };
         /** @description A place where the robot may be. */
         Hypothesis: {
@@ -1717,6 +1882,35 @@ export interface components {
             connections: components["schemas"]["Connection"][];
             /** @description Figures. */
             statistics: components["schemas"]["MapStatistics"];
+        };
+        /** @description A name that stands for a version of the map. */
+        MapChannel: {
+            /**
+             * @description Its name.
+             * @example stable
+             */
+            channel: string;
+            /**
+             * Format: int64
+             * @description Where it points. This version is kept as long as it does.
+             */
+            map_version: number;
+            /**
+             * Format: int64
+             * @description Where it pointed before, and goes when the last move is taken back.
+             */
+            map_version_before?: number | null;
+            /** @description The last moves, the newest first. */
+            moves: components["schemas"]["ChannelMove"][];
+            /** @description The map in the words of VDA 5050. */
+            vda5050: components["schemas"]["VdaMap"];
+        };
+        /** @description Part of a list. */
+        MapChannelPage: {
+            /** @description In order. */
+            items: components["schemas"]["MapChannel"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
         };
         /** @description A run in the map. */
         MapRun: {
@@ -2157,6 +2351,14 @@ export interface components {
              */
             num_scans?: number | null;
         };
+        /** @description What a robot says of itself. */
+        RobotReport: {
+            /**
+             * Format: int64
+             * @description The version of the map that it has loaded.
+             */
+            map_version: number;
+        };
         /** @description A part of the floor with walls and doors around it. */
         Room: {
             /**
@@ -2198,6 +2400,67 @@ export interface components {
             items: components["schemas"]["Room"][];
             /** @description Where the next page begins; null at the end. */
             next_cursor?: string | null;
+        };
+        /** @description `geometry_msgs/Point`. */
+        RosPoint: {
+            /**
+             * Format: double
+             * @description Metres.
+             */
+            x: number;
+            /**
+             * Format: double
+             * @description Metres.
+             */
+            y: number;
+            /**
+             * Format: double
+             * @description Metres; 0.
+             */
+            z: number;
+        };
+        /** @description `geometry_msgs/Pose`. */
+        RosPose: {
+            /** @description Metres. */
+            position: components["schemas"]["RosPoint"];
+            /** @description A unit quaternion. */
+            orientation: components["schemas"]["RosQuaternion"];
+        };
+        /** @description `geometry_msgs/Quaternion`. */
+        RosQuaternion: {
+            /**
+             * Format: double
+             * @description 0.
+             */
+            x: number;
+            /**
+             * Format: double
+             * @description 0.
+             */
+            y: number;
+            /**
+             * Format: double
+             * @description Sine of half the heading.
+             */
+            z: number;
+            /**
+             * Format: double
+             * @description Cosine of half the heading.
+             */
+            w: number;
+        };
+        /** @description `builtin_interfaces/Time`. */
+        RosTime: {
+            /**
+             * Format: int32
+             * @description Seconds.
+             */
+            sec: number;
+            /**
+             * Format: int64
+             * @description And nanoseconds.
+             */
+            nanosec: number;
         };
         /** @description A way from one position to another. */
         Route: {
@@ -2525,6 +2788,17 @@ export interface components {
          * @enum {string}
          */
         Turn: "left" | "right";
+        /** @description The map of a channel in the words of VDA 5050, as its action `downloadMap` wants them. */
+        VdaMap: {
+            /** @description Name of the site. */
+            mapId: string;
+            /** @description Number of the version. */
+            mapVersion: string;
+            /** @description Where its grid is on this server. */
+            mapDownloadLink: string;
+            /** @description Digest of everything that the version holds, in hexadecimal: equal digests, equal maps. */
+            mapHash: string;
+        };
         /** @description A word ⟨d, s, a⟩. */
         Word: {
             /** @description Its name. */
@@ -3564,7 +3838,7 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content: {
-                    "application/octet-stream": number[];
+                    "application/octet-stream": string;
                 };
             };
             401: components["responses"]["Unauthorized"];
@@ -3716,6 +3990,286 @@ export interface operations {
             404: components["responses"]["NotFound"];
             408: components["responses"]["RequestTimeout"];
             /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    list_channels: {
+        parameters: {
+            query?: {
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of channels */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MapChannelPage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    get_channel: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The channel */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MapChannel"];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    move_channel: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: {
+            content: {
+                "application/json": components["schemas"]["ChannelTarget"] | null;
+            };
+        };
+        responses: {
+            /** @description It points there */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MapChannel"];
+                };
+            };
+            /** @description It was made and points there */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MapChannel"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    delete_channel: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It is gone */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    list_channel_robots: {
+        parameters: {
+            query?: {
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of robots */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ChannelRobotPage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    report_channel_robot: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+                /** @description Name of the robot, chosen by the client */
+                robot: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RobotReport"];
+            };
+        };
+        responses: {
+            /** @description It is noted */
+            204: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            413: components["responses"]["PayloadTooLarge"];
+            415: components["responses"]["UnsupportedMediaType"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    roll_back_channel: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the channel, chosen by the client */
+                channel: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description It points where it did before */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MapChannel"];
+                };
+            };
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description There is no kept version to go back to */
             409: {
                 headers: {
                     [name: string]: unknown;
@@ -4251,8 +4805,13 @@ export interface operations {
             query?: {
                 /** @description The version; the serving one unless said. */
                 version?: number;
-                /** @description The component; for grids the first unless said, elsewhere all. */
+                /** @description The component; the first unless said. */
                 component?: number;
+                /**
+                 * @description Only the cells that this rectangle touches: `x,y,x,y` of two opposite corners, metres, in the map.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
             };
             header?: never;
             path: {
@@ -4304,8 +4863,13 @@ export interface operations {
             query?: {
                 /** @description The version; the serving one unless said. */
                 version?: number;
-                /** @description The component; for grids the first unless said, elsewhere all. */
+                /** @description The component; the first unless said. */
                 component?: number;
+                /**
+                 * @description Only the cells that this rectangle touches: `x,y,x,y` of two opposite corners, metres, in the map.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
             };
             header?: never;
             path: {
@@ -4357,8 +4921,13 @@ export interface operations {
             query?: {
                 /** @description The version; the serving one unless said. */
                 version?: number;
-                /** @description The component; for grids the first unless said, elsewhere all. */
+                /** @description The component; the first unless said. */
                 component?: number;
+                /**
+                 * @description Only the cells that this rectangle touches: `x,y,x,y` of two opposite corners, metres, in the map.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
             };
             header?: never;
             path: {
@@ -4410,8 +4979,13 @@ export interface operations {
             query?: {
                 /** @description The version; the serving one unless said. */
                 version?: number;
-                /** @description The component; for grids the first unless said, elsewhere all. */
+                /** @description The component; the first unless said. */
                 component?: number;
+                /**
+                 * @description Only the cells that this rectangle touches: `x,y,x,y` of two opposite corners, metres, in the map.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
             };
             header?: never;
             path: {
@@ -4429,6 +5003,64 @@ export interface operations {
                 };
                 content: {
                     "application/yaml": Record<string, never>;
+                };
+            };
+            /** @description The client has this version */
+            304: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            /** @description No map has been built yet */
+            409: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/problem+json": components["schemas"]["Problem"];
+                };
+            };
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
+    get_map_mcap: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+                /** @description The component; the first unless said. */
+                component?: number;
+                /**
+                 * @description Only the cells that this rectangle touches: `x,y,x,y` of two opposite corners, metres, in the map.
+                 * @example 0,0,12.5,8
+                 */
+                area?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description The file */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/octet-stream": string;
                 };
             };
             /** @description The client has this version */

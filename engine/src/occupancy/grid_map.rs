@@ -162,6 +162,31 @@ impl GridMap {
         halved
     }
 
+    /// The cells that a rectangle of the map's frame touches, as far as there are any.
+    pub fn window(&self, low: &Point2, high: &Point2) -> Option<Self> {
+        let inside = |cell: i64, num: usize| cell.clamp(0, num as i64 - 1);
+        let ((left, bottom), (right, top)) = (self.cell_at(low), self.cell_at(high));
+        let is_beside = right < 0
+            || top < 0
+            || left >= self.width as i64
+            || bottom >= self.height as i64
+            || right < left
+            || top < bottom;
+        if is_beside {
+            return None;
+        }
+        let (left, right) = (inside(left, self.width), inside(right, self.width));
+        let (bottom, top) = (inside(bottom, self.height), inside(top, self.height));
+        let width = (right - left + 1) as usize;
+        let rows = (bottom as usize..=top as usize).map(|row| row * self.width + left as usize);
+        let cells = rows.flat_map(|first| &self.cells[first..first + width]).copied().collect();
+        let corner = Point2::new(
+            self.origin.x + left as f64 * self.resolution_m,
+            self.origin.y + bottom as f64 * self.resolution_m,
+        );
+        Self::new(width, self.resolution_m, corner, cells)
+    }
+
     fn index(&self, column: i64, row: i64) -> Option<usize> {
         let is_inside = column >= 0 && row >= 0 && column < self.width as i64 && row < self.height as i64;
         is_inside.then(|| row as usize * self.width + column as usize)
@@ -192,6 +217,20 @@ mod tests {
     use crate::geometry::Pose2;
     use crate::occupancy::OccupancyConfig;
     use crate::scan::ScanGeometry;
+
+    #[test]
+    fn a_window_holds_the_cells_that_it_touches() {
+        let map = GridMap::drawn(&["#...", ".#..", "..#."], 0.5);
+        let window = map.window(&Point2::new(0.6, 0.2), &Point2::new(1.4, 0.9)).unwrap();
+        assert_eq!(window, {
+            let mut expected = GridMap::drawn(&["#.", ".#"], 0.5);
+            expected.origin = Point2::new(0.5, 0.0);
+            expected
+        });
+        assert_eq!(map.window(&Point2::new(-9.0, -9.0), &Point2::new(9.0, 9.0)).unwrap(), map);
+        assert_eq!(map.window(&Point2::new(5.0, 0.0), &Point2::new(6.0, 1.0)), None);
+        assert_eq!(map.window(&Point2::new(1.0, 1.0), &Point2::new(-1.0, 0.0)), None);
+    }
 
     #[test]
     fn cells_and_points_agree() {

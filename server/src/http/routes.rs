@@ -4,8 +4,8 @@ use utoipa_axum::router::OpenApiRouter;
 use utoipa_axum::routes;
 
 use super::resources::{
-    annotations, backups, batches, changes, events, jobs, keys, labels, localizations, maps, matches,
-    operations, places, rooms, runs, sites, texts, word_queries,
+    annotations, backups, batches, changes, channels, events, jobs, keys, labels, localizations, maps,
+    matches, operations, places, rooms, runs, sites, texts, word_queries,
 };
 use super::{forms, page};
 use crate::auth::{Rule, Ruled};
@@ -50,12 +50,19 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(READ, routes!(matches::get_match))
         .ruled(WRITE, routes!(matches::decide_match, matches::undecide_match))
         .ruled(READ, routes!(maps::get_map))
+        .ruled(READ, routes!(channels::list_channels))
+        .ruled(READ, routes!(channels::get_channel))
+        .ruled(ADMIN, routes!(channels::move_channel_to, channels::delete_channel_of))
+        .ruled(ADMIN, routes!(channels::roll_back_channel))
+        .ruled(READ, routes!(channels::list_channel_robots))
+        .ruled(WRITE, routes!(channels::report_channel_robot))
         .ruled(READ, routes!(forms::get_grid))
         .ruled(READ, routes!(forms::get_grid_pgm))
         .ruled(READ, routes!(forms::get_grid_png))
         .ruled(READ, routes!(forms::get_grid_yaml))
         .ruled(READ, routes!(forms::get_graph_g2o))
         .ruled(READ, routes!(forms::get_map_tum))
+        .ruled(READ, routes!(forms::get_map_mcap))
         .ruled(READ, routes!(forms::get_picture_png))
         .ruled(READ, routes!(forms::get_picture_svg))
         .ruled(READ, routes!(localizations::list_localizations, localizations::open_localization))

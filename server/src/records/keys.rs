@@ -67,6 +67,10 @@ pub enum Key {
     Registrations(u32),
     /// What a person drew into the map.
     Annotation(u64),
+    /// Where a channel points, by its name.
+    Channel(String),
+    /// Which version a robot drives by: the channel's name and its own.
+    ChannelRobot(String, String),
 }
 
 impl Key {
@@ -104,6 +108,8 @@ impl Key {
             Key::Job(number) => Writer::new(0x31).u64(*number).done(),
             Key::Registrations(part) => Writer::new(0x32).u32(*part).done(),
             Key::Annotation(number) => Writer::new(0x33).u64(*number).done(),
+            Key::Channel(name) => Writer::new(0x34).name(name).done(),
+            Key::ChannelRobot(channel, robot) => Writer::new(0x35).name(channel).name(robot).done(),
         }
     }
 
@@ -207,6 +213,22 @@ impl Key {
         vec![0x33]
     }
 
+    /// The prefix of all channels.
+    pub fn all_channels() -> Vec<u8> {
+        vec![0x34]
+    }
+
+    /// The prefix of what the robots of a channel said.
+    pub fn all_channel_robots(channel: &str) -> Vec<u8> {
+        Writer::new(0x35).name(channel).done()
+    }
+
+    /// The name that closes a key.
+    pub fn last_name(key: &[u8]) -> Option<String> {
+        let names = key.get(1..)?.strip_suffix(&[0])?;
+        String::from_utf8(names.rsplit(|byte| *byte == 0).next()?.to_vec()).ok()
+    }
+
     /// The big-endian number that closes a key, such as the first sequence number of a chunk.
     pub fn last_u64(key: &[u8]) -> Option<u64> {
         key.last_chunk().map(|bytes| u64::from_be_bytes(*bytes))
@@ -283,6 +305,8 @@ mod tests {
             any::<u64>().prop_map(Key::Job),
             any::<u32>().prop_map(Key::Registrations),
             any::<u64>().prop_map(Key::Annotation),
+            "[A-Za-z0-9._-]{1,8}".prop_map(Key::Channel),
+            ("[A-Za-z0-9._-]{1,8}", "[A-Za-z0-9._-]{1,8}").prop_map(|(c, robot)| Key::ChannelRobot(c, robot)),
         ]
     }
 
@@ -303,5 +327,10 @@ mod tests {
         assert_eq!(Key::run_of_packed_text(&Key::PackedText(1, 7, 2).encode()), Some(7));
         assert_eq!(Key::deleted_run(&Key::DeletedRun(7).encode()), Some(7));
         assert_eq!(Key::last_u64(&Key::Scans(7, 9).encode()), Some(9));
+        let robot = Key::ChannelRobot("stable".into(), "r7".into()).encode();
+        assert!(robot.starts_with(&Key::all_channel_robots("stable")));
+        assert!(!robot.starts_with(&Key::all_channel_robots("stab")));
+        assert_eq!(Key::last_name(&robot).as_deref(), Some("r7"));
+        assert_eq!(Key::last_name(&Key::Channel("stable".into()).encode()).as_deref(), Some("stable"));
     }
 }

@@ -6,7 +6,7 @@
 //!                                                   └► Map: poses · labels · places · rooms · matches
 //!
 //! keys                       where a value stands, in the order in which it is read
-//! stored, stored_map, annotation   plain values
+//! stored, stored_map, annotation, channel   plain values
 //! series, scans, pieces      values that are cut into chunks
 //! codec, packed_ranges       their bytes, with version and checksum
 //! ```
@@ -15,6 +15,7 @@
 //! also when another begins to serve between the two.
 
 mod annotation;
+mod channel;
 pub mod codec;
 mod deletion;
 mod keys;
@@ -29,6 +30,7 @@ mod stored;
 mod stored_map;
 
 pub use annotation::{Annotation, Shape};
+pub use channel::{Channel, ChannelMove, RobotReport};
 pub use deletion::delete_prefixes;
 pub use keys::{Generation, Key, MapVersion, PartKind, RunIdx};
 pub use map::{Map, PlacedRun, Visit, append_places, append_rooms, match_chunks};

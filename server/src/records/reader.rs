@@ -6,6 +6,7 @@ use locution_engine::mapping::Decision;
 use serde::de::DeserializeOwned;
 
 use super::annotation::Annotation;
+use super::channel::{Channel, RobotReport};
 use super::codec;
 use super::keys::{Generation, Key, MapVersion, RunIdx};
 use super::map::Map;
@@ -90,11 +91,34 @@ impl SiteReader {
         annotations.collect()
     }
 
+    /// All channels, by name.
+    pub async fn channels(&self) -> Result<Vec<(String, Channel)>, StorageError> {
+        let entries = self.store.scan(&Key::all_channels(), &[], usize::MAX).await?;
+        entries.iter().map(|(key, bytes)| Ok((named(key)?, Channel::decode(bytes)?))).collect()
+    }
+
+    /// One of them; `None` when there is none of this name.
+    pub async fn channel(&self, name: &str) -> Result<Option<Channel>, StorageError> {
+        let bytes = self.store.get(&Key::Channel(name.to_owned()).encode()).await?;
+        bytes.map(|bytes| Channel::decode(&bytes)).transpose()
+    }
+
+    /// What the robots of a channel said, by name.
+    pub async fn channel_robots(&self, channel: &str) -> Result<Vec<(String, RobotReport)>, StorageError> {
+        let entries = self.store.scan(&Key::all_channel_robots(channel), &[], usize::MAX).await?;
+        entries.iter().map(|(key, bytes)| Ok((named(key)?, RobotReport::decode(bytes)?))).collect()
+    }
+
     /// One of them; `None` when there is none of this number.
     pub async fn annotation(&self, number: u64) -> Result<Option<Annotation>, StorageError> {
         let bytes = self.store.get(&Key::Annotation(number).encode()).await?;
         bytes.map(|bytes| Annotation::decode(&bytes)).transpose()
     }
+}
+
+/// The name that closes a key.
+fn named(key: &[u8]) -> Result<String, StorageError> {
+    Key::last_name(key).ok_or_else(|| StorageError::Corrupt { what: "the key of a channel".into() })
 }
 
 /// The value of one key; `what` names it in errors.

@@ -10,7 +10,7 @@ import type { Drawing } from "./camera";
 import type { Grid } from "./grid";
 import { strokePolylines } from "./polyline";
 import type { Polyline } from "./polyline";
-import type { Layer } from "./view";
+import type { Hit, Layer } from "./view";
 
 export function wallsLayer(grid: Grid, isFaint = false): Layer {
   return {
@@ -180,7 +180,7 @@ function drawChosen(drawing: Drawing, { earlier, later }: PlacedMatch): void {
   for (const [end, color] of [[earlier, "#0072b2"], [later, "#d55e00"]] as const) drawArrow(drawing, end, color, 12);
 }
 
-function distanceToLine(point: Point, a: Point, b: Point): number {
+export function distanceToLine(point: Point, a: Point, b: Point): number {
   const [dx, dy] = [b.x - a.x, b.y - a.y];
   const squared = dx * dx + dy * dy;
   const share = squared ? Math.max(0, Math.min(1, ((point.x - a.x) * dx + (point.y - a.y) * dy) / squared)) : 0;
@@ -228,7 +228,7 @@ export function labelsLayer(labels: Schemas["Label"][]): Layer {
   };
 }
 
-function drawDisc(drawing: Drawing, at: Point, color: string, radius: number): void {
+export function drawDisc(drawing: Drawing, at: Point, color: string, radius: number): void {
   const { context } = drawing;
   context.beginPath();
   context.arc(drawing.px(at.x), drawing.py(at.y), radius, 0, 2 * Math.PI);
@@ -261,6 +261,8 @@ export interface Area {
   outline: Point[];
   holes: Point[][];
   center: Point;
+  /** What a click on it picks; its name and note unless said. */
+  hit?: Hit;
 }
 
 export function areasLayer(areas: Area[]): Layer {
@@ -285,7 +287,7 @@ export function areasLayer(areas: Area[]): Layer {
     },
     pick(point, radius_m) {
       const area = areas.find(({ outline, holes }) => isInside(point, outline) && !holes.some((hole) => isInside(point, hole)));
-      return area && { hit: { kind: "note", text: `${area.name}: ${area.note}` }, distance_m: 1.8 * radius_m };
+      return area && { hit: area.hit ?? { kind: "note", text: `${area.name}: ${area.note}` }, distance_m: 1.8 * radius_m };
     },
   };
 }
@@ -298,14 +300,6 @@ function isInside(point: Point, outline: Point[]): boolean {
     if (crosses && point.x < ((b.x - a.x) * (point.y - a.y)) / (b.y - a.y) + a.x) inside = !inside;
   });
   return inside;
-}
-
-export function doorsLayer(doors: Point[]): Layer {
-  return {
-    draw(drawing) {
-      for (const door of doors) drawDisc(drawing, door, drawing.isDark ? "#ffffff" : "#23272f", 3.5);
-    },
-  };
 }
 
 export function roomColor(idx: number): string {

@@ -1,5 +1,6 @@
 // A canvas that shows layers of a map and is moved by mouse, fingers and keys.
 
+import type { Schemas } from "../api";
 import type { Bounds, Point } from "../geometry";
 import { SCALE_MAX, SCALE_MIN, Drawing, cameraFor } from "./camera";
 import type { Camera } from "./camera";
@@ -10,6 +11,8 @@ export type Hit =
   | { kind: "match"; id: string }
   | { kind: "word"; run: string; observation: number }
   | { kind: "run"; run: string }
+  | { kind: "room"; room: Schemas["Room"] }
+  | { kind: "annotation"; annotation: Schemas["Annotation"] }
   | { kind: "note"; text: string };
 
 /** Something drawn on the map. */

@@ -7,7 +7,7 @@ import { useLoaded } from "../cell";
 import { LABEL_COLORS } from "../colors";
 import { patch, usePlace } from "../place";
 import { useSite } from "../site";
-import { Alert, Choice, Field, percent } from "../ui";
+import { Alert, Choice, LazyField, percent } from "../ui";
 import { Answers } from "./answers";
 import type { Found } from "./answers";
 
@@ -50,7 +50,7 @@ export function AskByLabels() {
       {asked.map(({ label, length_min_m, turn }, idx) => (
         <div key={idx} class="card row" role="group" aria-label={`Place ${idx + 1}`}>
           <Choice label="Place" value={label} options={LABELS.map((name) => [name, name] as const)} onChange={(value) => edit(idx, { label: value })} />
-          <Field label="At least, metres" type="number" min={0} max={1000} step="any" value={length_min_m} onChange={(event) => edit(idx, { length_min_m: event.currentTarget.value })} />
+          <LazyField label="At least, metres" type="number" min={0} max={1000} step="any" value={length_min_m} onCommit={(text) => edit(idx, { length_min_m: text })} />
           <Choice label="Turn" value={turn} options={[["", "any"], ["left", "left"], ["right", "right"]]} onChange={(value) => edit(idx, { turn: value })} />
           <button type="button" class="plain" onClick={() => set(asked.filter((_, i) => i !== idx))}>
             Remove

@@ -6,7 +6,7 @@ import { useLoaded } from "../cell";
 import { CLASS_COLORS, classColor } from "../colors";
 import { patch, usePlace } from "../place";
 import { useSite } from "../site";
-import { Alert, Choice, Field } from "../ui";
+import { Alert, Choice, LazyField } from "../ui";
 import { Answers, foundByWords } from "./answers";
 import { OBSERVATION_M } from "./note";
 import { patternsOf, patternsText, wirePattern } from "./words";
@@ -89,8 +89,8 @@ function PatternForm(props: { pattern: Pattern; onChange: (pattern: Pattern) => 
     <div class="card" role="group" aria-label="The chosen word">
       <div class="row">
         <Choice label="Density class" value={pattern.class === undefined ? "" : String(pattern.class)} options={[["", "any"], ...CLASS_COLORS.map((_, d) => [String(d), `${d}${d === 0 ? ", narrow" : d === 7 ? ", wide" : ""}`] as const)]} onChange={(value) => change("class", number(value))} />
-        <Field label="Length, metres" type="number" min={0.1} max={1000} step="0.1" value={pattern.size === undefined ? "" : String(Math.round(pattern.size) / 10)} onChange={(event) => change("size", event.currentTarget.value ? Math.round(Number(event.currentTarget.value) / OBSERVATION_M) : undefined)} />
-        <Field label="Turn, degrees" type="number" min={-720} max={720} step="1" value={pattern.turn_deg ?? ""} onChange={(event) => change("turn_deg", number(event.currentTarget.value))} hint="left is positive" />
+        <LazyField label="Length, metres" type="number" min={0.1} max={1000} step="0.1" value={pattern.size === undefined ? "" : String(Math.round(pattern.size) / 10)} onCommit={(text) => change("size", text ? Math.round(Number(text) / OBSERVATION_M) : undefined)} />
+        <LazyField label="Turn, degrees" type="number" min={-720} max={720} step="1" value={String(pattern.turn_deg ?? "")} onCommit={(text) => change("turn_deg", number(text))} hint="left is positive" />
       </div>
       <div class="row">
         <button type="button" class="plain" disabled={!props.onEarlier} onClick={props.onEarlier}>

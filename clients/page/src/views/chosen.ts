@@ -3,12 +3,13 @@
 import { useMemo } from "preact/hooks";
 import { listAll, sitePath } from "../api";
 import type { Schemas } from "../api";
-import { useLoaded } from "../cell";
+import { Cell, useCell, useLoaded } from "../cell";
 import { LABEL_COLORS } from "../colors";
 import { pathByClass, pathByDensity } from "../drives";
 import type { Point } from "../geometry";
 import type { Grid } from "../map/grid";
-import { areasLayer, changesLayer, doorsLayer, labelsLayer, matchesLayer, roomColor, runsLayer, wallsLayer, wordsLayer } from "../map/layers";
+import { annotationsLayer, doorsLayer } from "../map/drawn";
+import { areasLayer, changesLayer, labelsLayer, matchesLayer, roomColor, runsLayer, wallsLayer, wordsLayer } from "../map/layers";
 import type { Area, RunLine } from "../map/layers";
 import { Polyline } from "../map/polyline";
 import type { Layer } from "../map/view";
@@ -27,6 +28,7 @@ export const LAYERS = [
   ["matches", "Matches"],
   ["labels", "Labels"],
   ["changes", "Changes"],
+  ["annotations", "Annotations"],
 ] as const;
 
 export type LayerName = (typeof LAYERS)[number][0];
@@ -34,6 +36,9 @@ export type LayerName = (typeof LAYERS)[number][0];
 const SHOWN_AT_FIRST = "walls,runs,matches";
 export const STATES = ["verified", "candidate", "rejected"] as const;
 export const CHANNELS = ["spatial", "words", "profile"] as const;
+
+/** Counts what people named and drew here, so that it is asked for again. */
+export const annotated = new Cell(0);
 
 /** What the address says of layers. */
 export interface Choice {
@@ -84,7 +89,9 @@ export function useLayers(state: SiteState, grid: Grid | undefined): Layers {
   const matches = useLoaded(async () => (key("matches") && map ? placeMatches(state.site, map, filtered(map, component, await matchesOf(state.site, map.version), choice)) : []), key("matches", [...choice.states].join(), [...choice.channels].join()));
   const labels = useLoaded(() => list<Schemas["Label"]>(state, key("labels"), "labels", {}), key("labels"));
   const places = useLoaded(() => list<Schemas["Place"]>(state, key("places"), "places", { component: String(component) }), key("places"));
-  const rooms = useLoaded(() => loadRooms(state, key("rooms")), key("rooms"));
+  const round = String(useCell(annotated));
+  const rooms = useLoaded(() => loadRooms(state, key("rooms", round)), key("rooms", round));
+  const annotations = useLoaded(() => list<Schemas["Annotation"]>(state, key("annotations", round), "annotations", { component: String(component) }), key("annotations", round));
   const sessions = [query.get("before") ?? "", query.get("after") ?? ""];
   const changes = useLoaded(() => list<Schemas["Change"]>(state, key("changes"), "changes", { before: sessions[0]!, after: sessions[1]! }), key("changes", ...sessions));
 
@@ -100,9 +107,10 @@ export function useLayers(state: SiteState, grid: Grid | undefined): Layers {
     runs: () => runsLayer(runs, chosenRun),
     matches: () => matches.value && matchesLayer(matches.value, chosenMatch),
     labels: () => labels.value && labelsLayer(labels.value.filter((label) => label.component === component)),
+    annotations: () => annotations.value && annotationsLayer(annotations.value),
     changes: () => changes.value && changesLayer(changes.value.filter((change) => change.component === component)),
   };
-  const parts = { words, matches, labels, places, rooms, changes };
+  const parts = { words, matches, labels, places, rooms, changes, annotations };
   const layers = useMemo(
     () => LAYERS.filter(([name]) => isShown(name)).map(([name]) => made[name]()).filter((layer) => layer !== undefined),
     [grid, runs, wordLines, chosenRun, chosenMatch, [...choice.shown].join(), ...Object.values(parts).map(({ value }) => value)],
@@ -187,5 +195,6 @@ function areaOfRoom(room: Schemas["Room"], idx: number): Area {
     outline,
     holes,
     center: room.centre,
+    hit: { kind: "room", room },
   };
 }

@@ -7,6 +7,7 @@ import { useSite } from "../site";
 import { Act, Choice, Figures, Go, Tick, count, metres } from "../ui";
 import { CHANNELS, LAYERS, STATES, useChoice } from "./chosen";
 import type { LayerName } from "./chosen";
+import { NewAnnotation } from "./named";
 import { RouteForm } from "./route";
 
 export function LayersView() {
@@ -36,6 +37,8 @@ export function LayersView() {
                 {name === "matches" && choice.shown.has(name) && <MatchFilters />}
                 {name === "words" && choice.shown.has(name) && <WordColors />}
                 {name === "changes" && choice.shown.has(name) && <Sessions />}
+                {name === "rooms" && choice.shown.has(name) && <small class="sub soft">Click a room to name it.</small>}
+                {name === "annotations" && choice.shown.has(name) && <NewAnnotation />}
               </div>
             ))}
           </fieldset>

@@ -1,7 +1,7 @@
 // What the colors on the map mean; only of what is shown.
 
 import { useState } from "preact/hooks";
-import { CHANNEL_DASHES, CHANGE_COLORS, CLASS_COLORS, LABEL_COLORS, STATE_COLORS, runColor } from "../colors";
+import { ANNOTATION_COLOR, CHANNEL_DASHES, CHANGE_COLORS, CLASS_COLORS, LABEL_COLORS, STATE_COLORS, runColor } from "../colors";
 import { densityColors } from "../map/layers";
 import { addressOf, placeNow } from "../place";
 import { useSite } from "../site";
@@ -59,6 +59,7 @@ export function Legend({ layers }: { layers: Layers }) {
       )}
       {(has("labels") || has("places")) && <Key colors={LABEL_COLORS} />}
       {has("changes") && <Key colors={CHANGE_COLORS} />}
+      {has("annotations") && <Key colors={{ "drawn by people": ANNOTATION_COLOR }} />}
     </details>
   );
 }

@@ -15,6 +15,7 @@ import type { SiteState } from "../site";
 import { Alert, Go } from "../ui";
 import { useLayers } from "./chosen";
 import { Legend } from "./legend";
+import { AnnotationNote, RoomNote } from "./named";
 import { MapChoice } from "./site";
 import { WordNote } from "./note";
 
@@ -85,7 +86,10 @@ interface Setters {
 function useView(state: SiteState, canvas: { current: HTMLCanvasElement | null }, grid: Grid | undefined, set: Setters): void {
   const { stage, map, component, site } = state;
   const bounds = useMemo(() => boundsOf(state, grid), [map, component, grid]);
+  const name = `${site}/${component}`;
   const shown = useRef("");
+  const current = useRef(name);
+  current.current = name;
   const asked = usePlace().query.get("at");
   const written = useRef(asked);
   const timer = useRef(0);
@@ -95,6 +99,8 @@ function useView(state: SiteState, canvas: { current: HTMLCanvasElement | null }
     stage.view = view;
     view.onCamera = (camera) => {
       set.setScale(camera.scale);
+      // Who has moved the map does not want it fitted when its walls come.
+      shown.current = current.current;
       window.clearTimeout(timer.current);
       timer.current = window.setTimeout(() => {
         written.current = cameraText(camera);
@@ -117,7 +123,6 @@ function useView(state: SiteState, canvas: { current: HTMLCanvasElement | null }
       else if (hit?.kind === "match") go(["sites", site, "matches", hit.id], placeNow().query);
       set.setNote(hit?.kind === "match" ? undefined : hit);
     };
-    const name = `${site}/${component}`;
     const camera = cameraOf(placeNow().query.get("at"));
     if (map && shown.current !== name) {
       // The first time the address decides, then what there is to see.
@@ -191,6 +196,8 @@ function Picked({ hit, onClose }: { hit: Hit; onClose: () => void }) {
           Run <Go to={addressOf(["sites", site, "runs", hit.run], placeNow().query)}>{hit.run}</Go>
         </p>
       )}
+      {hit.kind === "room" && <RoomNote room={hit.room} onClose={onClose} />}
+      {hit.kind === "annotation" && <AnnotationNote annotation={hit.annotation} onClose={onClose} />}
       {hit.kind === "word" && <WordNote run={hit.run} observation={hit.observation} />}
       <button type="button" class="close" aria-label="Close" onClick={onClose}>
         ×

@@ -1,6 +1,5 @@
 // The way from one place to another over ground that was driven.
 
-import { useState } from "preact/hooks";
 import { api } from "../api";
 import type { Schemas } from "../api";
 import { useLoaded } from "../cell";
@@ -10,6 +9,7 @@ import type { Layer } from "../map/view";
 import { patch, usePlace } from "../place";
 import { useOverlay, useSite } from "../site";
 import { Alert, metres } from "../ui";
+import { AIM_HINT, useAim } from "./aim";
 
 function pointOf(text: string | null): Point | undefined {
   const [x, y] = (text ?? "").split(",").map(Number);
@@ -17,9 +17,9 @@ function pointOf(text: string | null): Point | undefined {
 }
 
 export function RouteForm() {
-  const { site, map, component, stage } = useSite();
+  const { site, map, component } = useSite();
   const { query } = usePlace();
-  const [aim, setAim] = useState<"from" | "to" | undefined>();
+  const aim = useAim();
   const [from, to] = [pointOf(query.get("from")), pointOf(query.get("to"))];
   const route = useLoaded(
     async (signal) => {
@@ -30,30 +30,19 @@ export function RouteForm() {
     `${query.get("from")} ${query.get("to")} ${component} ${map?.version}`,
   );
   useOverlay(from ? [routeLayer(from, to, route.value)] : [], `${query.get("from")} ${query.get("to")} ${route.value?.length_m}`);
-  const aimAt = (end: "from" | "to") => {
-    setAim(end);
-    stage.tool.set({
-      kind: "point",
-      take: ([point]) => {
-        stage.tool.set(undefined);
-        setAim(undefined);
-        if (point) patch({ [end]: `${point.x.toFixed(2)},${point.y.toFixed(2)}` });
-      },
-    });
-  };
+  const aimAt = (end: "from" | "to") => aim.ask(end, (point) => patch({ [end]: `${point.x.toFixed(2)},${point.y.toFixed(2)}` }));
   const stop = () => {
-    stage.tool.set(undefined);
-    setAim(undefined);
+    aim.stop();
     patch({ from: undefined, to: undefined });
   };
   return (
     <fieldset>
       <legend>Way over driven ground</legend>
       <div class="row">
-        <button type="button" class="plain" aria-pressed={aim === "from"} onClick={() => aimAt("from")}>
+        <button type="button" class="plain" aria-pressed={aim.wanted === "from"} onClick={() => aimAt("from")}>
           Set start
         </button>
-        <button type="button" class="plain" aria-pressed={aim === "to"} onClick={() => aimAt("to")}>
+        <button type="button" class="plain" aria-pressed={aim.wanted === "to"} onClick={() => aimAt("to")}>
           Set goal
         </button>
         {(from || to) && (
@@ -62,7 +51,7 @@ export function RouteForm() {
           </button>
         )}
       </div>
-      {aim && <p class="soft">Click the map; or focus it, move the cross with the arrow keys and press Enter.</p>}
+      {aim.wanted && <p class="soft">{AIM_HINT}</p>}
       <Alert error={route.error} />
       {route.value && (
         <>

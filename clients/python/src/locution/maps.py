@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,7 +88,9 @@ class SiteMap:
         query = {"version": self.version, "component": component}
         grid = self._transport.get(Grid, routes.GET_GRID, self._site, query=query)
         cells = np.array(grid.data, dtype=np.int8).reshape(grid.info.height, grid.info.width)
-        return OccupancyGrid(cells, grid.info.resolution, grid.info.origin)
+        corner = grid.info.origin
+        theta = 2.0 * math.atan2(corner.orientation.z, corner.orientation.w)
+        return OccupancyGrid(cells, grid.info.resolution, Pose(corner.position.x, corner.position.y, theta))
 
     def to_nav2(self, path: str | Path, component: int = 0) -> Path:
         """Writes a map that `nav2_map_server` loads; answers the name of its YAML file.
@@ -118,13 +121,17 @@ class SiteMap:
         """The map with runs and matches drawn, as SVG."""
         return self._form(routes.GET_PICTURE_SVG, component, "image/svg+xml").decode()
 
-    def graph_g2o(self, component: int | None = None) -> str:
-        """The pose graph in g2o's format."""
+    def graph_g2o(self, component: int = 0) -> str:
+        """The pose graph of a part of the map in g2o's format."""
         return self._form(routes.GET_GRAPH_G2O, component, "text/plain").decode()
 
-    def trajectory_tum(self, component: int | None = None) -> str:
-        """All trajectories in TUM's format."""
+    def trajectory_tum(self, component: int = 0) -> str:
+        """All trajectories of a part of the map in TUM's format."""
         return self._form(routes.GET_MAP_TUM, component, "text/plain").decode()
+
+    def mcap(self, component: int = 0) -> bytes:
+        """Grid and trajectories of a part of the map as MCAP, for Foxglove."""
+        return self._form(routes.GET_MAP_MCAP, component, "application/octet-stream")
 
     def trajectory(self, run: str) -> Trajectory:
         """Where a run was in this map."""

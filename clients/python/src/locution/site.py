@@ -266,6 +266,38 @@ class Site:
         """Forgets an annotation."""
         self._transport.send(routes.DELETE_ANNOTATION, self.name, annotation)
 
+    # channels
+
+    def channels(self) -> Iterator[models.MapChannel]:
+        """Names that stand for versions of the map, which robots follow."""
+        return self._transport.all(models.MapChannel, routes.LIST_CHANNELS, self.name)
+
+    def channel(self, channel: str) -> models.MapChannel:
+        """One channel: `map(site.channel("stable").map_version)` is what its robots drive by."""
+        return self._transport.get(models.MapChannel, routes.GET_CHANNEL, self.name, channel)
+
+    def move_channel(self, channel: str, version: int | None = None) -> models.MapChannel:
+        """Points a channel to a version, the served one unless said; makes it when there is none of this name."""
+        body = {"map_version": version}
+        return self._transport.get(models.MapChannel, routes.MOVE_CHANNEL, self.name, channel, json=body)
+
+    def roll_back_channel(self, channel: str) -> models.MapChannel:
+        """Takes the last move of a channel back."""
+        return self._transport.get(models.MapChannel, routes.ROLL_BACK_CHANNEL, self.name, channel)
+
+    def delete_channel(self, channel: str) -> None:
+        """Forgets a channel."""
+        self._transport.send(routes.DELETE_CHANNEL, self.name, channel)
+
+    def channel_robots(self, channel: str) -> Iterator[models.ChannelRobot]:
+        """Robots that follow a channel, and which version each has."""
+        return self._transport.all(models.ChannelRobot, routes.LIST_CHANNEL_ROBOTS, self.name, channel)
+
+    def report_channel_robot(self, channel: str, robot: str, version: int) -> None:
+        """Says which version of the map a robot has loaded."""
+        names = (self.name, channel, robot)
+        self._transport.send(routes.REPORT_CHANNEL_ROBOT, *names, json={"map_version": version})
+
     # matches
 
     def matches(

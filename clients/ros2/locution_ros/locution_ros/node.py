@@ -48,6 +48,7 @@ PARAMETERS: dict[str, Any] = {
     "spool_max_mb": 500,
     "publish_map": True,
     "map_component": 0,
+    "map_channel": "",
     "map_period_s": 10.0,
     "publish_tf": True,
     "localize_on_start": False,
@@ -199,7 +200,9 @@ class LocutionNode(Node):
             return
         self._map_looked_at = now
         try:
-            served = self._client.site(self._said["site"]).map()
+            site = self._client.site(self._said["site"])
+            channel = self._said["map_channel"]
+            served = site.map(site.channel(channel).map_version if channel else None)
             if served.version == self._map_version:
                 return
             grid = served.grid(self._said["map_component"])
@@ -211,6 +214,8 @@ class LocutionNode(Node):
         self._maps.publish(fill_occupancy_grid(OccupancyGrid(), self._said["map_frame"], stamp_ns, grid))
         self._map_version = served.version
         self.get_logger().info(f"map version {served.version} is published")
+        if channel:
+            site.report_channel_robot(channel, self._said["robot"], served.version)
 
     def _publish_transform(self) -> None:
         place = self._tracker.place

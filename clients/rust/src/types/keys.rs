@@ -2,13 +2,25 @@
 
 use serde::{Deserialize, Serialize};
 
+/// What a key may do; each includes those before it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scope {
+    /// Look, query, localize.
+    Read,
+    /// Also send runs, build maps and decide on matches.
+    Write,
+    /// Also make and delete sites.
+    Admin,
+}
+
 /// A key to be made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct NewKey {
     /// 1 to 64 of `A–Z a–z 0–9 . _ -`; stands in the server's log.
     pub name: String,
-    /// `read`, `write` or `admin`.
-    pub scope: String,
+    /// What it may do.
+    pub scope: Scope,
     /// Sites it may do it in; `*` means all.
     pub sites: Vec<String>,
     /// How long it is valid, seconds; for good when none are said.
@@ -25,8 +37,8 @@ pub struct NewKey {
 pub struct Key {
     /// Its name.
     pub name: String,
-    /// `read`, `write` or `admin`.
-    pub scope: String,
+    /// What it may do.
+    pub scope: Scope,
     /// Where.
     pub sites: Vec<String>,
     /// Whether it stands in the server's configuration, where the API cannot change it.

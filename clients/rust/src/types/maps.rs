@@ -118,6 +118,8 @@ pub struct MapStatistics {
 /// `nav_msgs/MapMetaData`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GridInfo {
+    /// 0: the server does not know when it is loaded.
+    pub map_load_time: RosTime,
     /// Metres per cell.
     pub resolution: f64,
     /// Cells.
@@ -125,12 +127,65 @@ pub struct GridInfo {
     /// Cells.
     pub height: usize,
     /// Pose of the lower left corner.
-    pub origin: Pose,
+    pub origin: RosPose,
 }
 
-/// An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
+/// `builtin_interfaces/Time`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RosTime {
+    /// Seconds.
+    pub sec: i32,
+    /// And nanoseconds.
+    pub nanosec: u32,
+}
+
+/// `geometry_msgs/Point`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RosPoint {
+    /// Metres.
+    pub x: f64,
+    /// Metres.
+    pub y: f64,
+    /// Metres.
+    pub z: f64,
+}
+
+/// `geometry_msgs/Quaternion`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RosQuaternion {
+    /// 0 in the plane.
+    pub x: f64,
+    /// 0 in the plane.
+    pub y: f64,
+    /// Sine of half the heading.
+    pub z: f64,
+    /// Cosine of half the heading.
+    pub w: f64,
+}
+
+/// `geometry_msgs/Pose`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RosPose {
+    /// Metres.
+    pub position: RosPoint,
+    /// A unit quaternion.
+    pub orientation: RosQuaternion,
+}
+
+/// `std_msgs/Header`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct GridHeader {
+    /// 0, as of a map that holds at all times.
+    pub stamp: RosTime,
+    /// `map`.
+    pub frame_id: String,
+}
+
+/// An occupancy grid, field by field a `nav_msgs/OccupancyGrid`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
+    /// Whose it is.
+    pub header: GridHeader,
     /// Where and how large.
     pub info: GridInfo,
     /// Row by row from the lower left: 0 free, 100 occupied, −1 unknown.

@@ -2,6 +2,7 @@
 //!
 //! Answers may gain members in later versions of the server; what is not known here is passed over.
 
+mod channels;
 mod events;
 mod jobs;
 mod keys;
@@ -14,17 +15,18 @@ mod sites;
 mod texts;
 mod values;
 
+pub use channels::{ChannelMove, ChannelRobot, ChannelTarget, MapChannel, RobotReport, VdaMap};
 pub use events::{Event, RunChange};
 pub use jobs::{Job, JobKind, JobState};
-pub use keys::{IssuedKey, Key, Keys, NewKey};
+pub use keys::{IssuedKey, Key, Keys, NewKey, Scope};
 pub use localizations::{
     ExampleAnswer, ExampleEvidence, ExamplePlace, Hypothesis, Localization, LocalizationState, Missing,
     NewLocalization, PosePrior,
 };
 pub use maps::{
-    Change, ChangeKind, ChangeVisit, Component, Connection, ConnectionKind, Grid, GridInfo, KeyframePose,
-    Label, LabelAnswer, LabelPattern, LabelQuery, Map, MapRun, MapStatistics, Place, PlaceLabel, Region,
-    Route, RouteStep, RouteTurn, Turn,
+    Change, ChangeKind, ChangeVisit, Component, Connection, ConnectionKind, Grid, GridHeader, GridInfo,
+    KeyframePose, Label, LabelAnswer, LabelPattern, LabelQuery, Map, MapRun, MapStatistics, Place,
+    PlaceLabel, Region, RosPoint, RosPose, RosQuaternion, RosTime, Route, RouteStep, RouteTurn, Turn,
 };
 pub use matches::{
     Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,

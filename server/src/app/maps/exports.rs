@@ -19,22 +19,21 @@ const NUM_PANELS_MAX: usize = 12;
 
 /// Head of every graph that is served.
 const GRAPH_HEAD: &str = "\
-# A vertex per keyframe, an edge per motion, and one per registration of verified matches; one FIX per component.
+# A vertex per keyframe, an edge per motion, and one per registration of verified matches; the first is held.
 # The vertices are where the map has them, which is not quite the optimum of these edges: the map weighs registrations
 # between submaps against each other, of which a match names the one that speaks for it, and shares out among the
 # keyframes in between. Solving these edges anew therefore moves vertices, by a few decimeters where few matches tie a run.
 ";
 
-/// The pose graph in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified matches, and
-/// one `FIX` per component. Comments say which run and scan each vertex is.
+/// The pose graph of a component in g2o's format: a vertex per keyframe, an edge per motion and per registration of verified
+/// matches, the first vertex held. Comments say which run and scan each vertex is.
 ///
 /// # Errors
 /// Those of the storage; [`AppError::Internal`] for a graph that cannot be.
-pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, AppError> {
-    let runs = map.placed_runs(component).await?;
+pub async fn graph_as_g2o(map: &Map, component: u32) -> Result<String, AppError> {
+    let runs = map.placed_runs(Some(component)).await?;
     let mut graph = PoseGraph::new();
     let mut first_of_run = vec![None; map.record.runs.len()];
-    let mut fixed = BTreeSet::new();
     let mut text = GRAPH_HEAD.to_owned();
     for placed in &runs {
         let first = graph.poses().len() as u32;
@@ -43,7 +42,7 @@ pub async fn graph_as_g2o(map: &Map, component: Option<u32>) -> Result<String, A
             graph.add_pose(pose.map_from_robot).map_err(AppError::internal)?;
             text += &format!("# {vertex} run {} scan {}\n", placed.map_run.name, pose.scan_seq);
         }
-        if fixed.insert(placed.map_run.component) {
+        if first == 0 && !placed.poses.is_empty() {
             graph.hold(first).map_err(AppError::internal)?;
         }
         add_motions(&mut graph, first, placed).await?;
@@ -76,20 +75,24 @@ async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> R
     Ok(())
 }
 
-/// Poses of every scan of every run of a component, or of all, in the order of the runs.
-pub async fn map_trajectories(
+/// Runs of a component, in their order, each with its pose at every scan.
+///
+/// # Errors
+/// Those of the storage.
+pub async fn ways_of_runs(
     site: &Site,
     map: &Map,
-    component: Option<u32>,
-) -> Result<Vec<StampedPose>, AppError> {
-    let mut poses = Vec::new();
+    component: u32,
+) -> Result<Vec<(String, Vec<StampedPose>)>, AppError> {
+    let mut ways = Vec::new();
     for run in &map.record.runs {
-        if run.num_poses > 0 && component.is_none_or(|component| component == run.component) {
+        if run.num_poses > 0 && component == run.component {
             let stored = map.reader().run(run.run).await?;
-            poses.extend(trajectory(site, &stored, Frame::Map, Some(map.record.version)).await?.poses);
+            let way = trajectory(site, &stored, Frame::Map, Some(map.record.version)).await?;
+            ways.push((run.name.clone(), way.poses));
         }
     }
-    Ok(poses)
+    Ok(ways)
 }
 
 /// A covariance that cannot be inverted brings no edge: the graph is for looking at, not for trusting blindly.

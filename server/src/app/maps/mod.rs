@@ -2,10 +2,12 @@
 
 mod annotations;
 mod changes;
+mod channels;
 mod exports;
 mod grids;
 mod labels;
 mod matches;
+mod mcap;
 mod places;
 mod regions;
 mod rooms;
@@ -16,12 +18,16 @@ pub use annotations::{
     delete_annotation, keep_annotations,
 };
 pub use changes::{ChangeVisit, DatedChange, NoSessions, Sessions};
-pub use exports::{PictureForm, graph_as_g2o, gray_image, map_trajectories};
+pub use channels::{
+    a_channel, channel_robots, channels, delete_channel, move_channel, note_robot, roll_back,
+};
+pub use exports::{PictureForm, graph_as_g2o, gray_image, ways_of_runs};
 pub use grids::GridKey;
 pub use labels::{DrivenStretch, LabelAnswer, find_labels, labels};
 pub use matches::{
     MatchFilter, MatchOrder, MatchStateKind, NumberedMatch, a_match, decide, matches, undecide,
 };
+pub use mcap::map_as_mcap;
 pub use places::{find_route, places};
 pub use regions::{Topology, topology};
 pub use rooms::{names_of_rooms, rooms, rooms_before};

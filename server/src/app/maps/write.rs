@@ -4,6 +4,7 @@ use locution_engine::mapping::{MatchState, SiteMap};
 use locution_engine::semantics::{MapLabels, MapRooms};
 use sha2::{Digest as _, Sha256};
 
+use super::channels::held_versions;
 use crate::app::AppError;
 use crate::app::site::Site;
 use crate::records::{
@@ -161,14 +162,38 @@ pub async fn serve_map(site: &Site, version: MapVersion) -> Result<(), AppError>
     .await
 }
 
-/// Drops the oldest versions beyond a number.
+/// Takes a version from those that can be asked for, unless a channel holds it; no channel can be moved to it afterwards.
+async fn hide_unless_held(site: &Site, version: MapVersion) -> Result<bool, AppError> {
+    loop {
+        let seen = site.state().record.next_decision;
+        if held_versions(site).await?.contains(&version) {
+            return Ok(false);
+        }
+        let is_hidden = site
+            .change(|record, batch| {
+                let is_as_seen = record.next_decision == seen;
+                if is_as_seen {
+                    batch.delete(Key::Map(version).encode());
+                }
+                Ok(is_as_seen)
+            })
+            .await?;
+        if is_hidden {
+            return Ok(true);
+        }
+    }
+}
+
+/// Drops the oldest versions beyond a number, except those that channels hold.
 ///
 /// # Errors
 /// Those of the storage.
 pub async fn drop_versions(site: &Site, num_kept: usize) -> Result<(), AppError> {
     let versions = site.map_versions().await?;
     for stale in &versions[..versions.len().saturating_sub(num_kept)] {
-        delete_prefixes(site.store(), &Key::all_of_map(*stale)).await?;
+        if hide_unless_held(site, *stale).await? {
+            delete_prefixes(site.store(), &Key::all_of_map(*stale)).await?;
+        }
     }
     Ok(())
 }

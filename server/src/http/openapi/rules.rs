@@ -7,9 +7,11 @@ use super::node::{Members, Node, node};
 const GUARDED: [&str; 2] = ["/v1/", "/metrics"];
 
 /// Names that stand in paths: what they name, their form and longest length.
-const PATH_PARAMETERS: [(&str, &str, &str, usize); 4] = [
+const PATH_PARAMETERS: [(&str, &str, &str, usize); 6] = [
     ("site", "Name of the site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("run", "Name of the run in its site, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
+    ("channel", "Name of the channel, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
+    ("robot", "Name of the robot, chosen by the client", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("key", "Name of the key, chosen when it was made", r"^[A-Za-z0-9_-][A-Za-z0-9._-]*$", 64),
     ("id", "Its name, chosen by the server", r"^[0-9]+$", 19),
 ];
@@ -162,7 +164,8 @@ fn type_answers(operation: &mut Node) {
     for response in responses.into_iter().flat_map(|responses| responses.values_mut()) {
         let content = response.get_mut("content").and_then(Node::members);
         for (media_type, body) in content.into_iter().flatten() {
-            let is_binary = media_type.starts_with("image/") && media_type != "image/svg+xml";
+            let is_binary = media_type == "application/octet-stream"
+                || media_type.starts_with("image/") && media_type != "image/svg+xml";
             let Some(body) = body.members() else { continue };
             if is_binary {
                 body.insert("schema".into(), node!({"type": "string", "format": "binary"}));

@@ -224,5 +224,5 @@ pub async fn get_map(at: MapAt) -> Result<Response, ApiError> {
         Ok(serde_json::to_vec(&map_dto(&at.map.record, versions, &runs, topology))
             .map_err(AppError::internal)?)
     };
-    at.answer("application/json", body).await
+    at.answer("application/json", ("map", "json"), body).await
 }

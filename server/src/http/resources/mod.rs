@@ -5,6 +5,7 @@ pub(super) mod annotations;
 pub(super) mod backups;
 pub(super) mod batches;
 pub(super) mod changes;
+pub(super) mod channels;
 pub(super) mod events;
 pub(super) mod jobs;
 pub(super) mod keys;

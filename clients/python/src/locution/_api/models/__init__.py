@@ -9,6 +9,10 @@ from .change_page import ChangePage
 from .change_visit import ChangeVisit
 from .changed_site import ChangedSite
 from .channel import Channel
+from .channel_move import ChannelMove
+from .channel_robot import ChannelRobot
+from .channel_robot_page import ChannelRobotPage
+from .channel_target import ChannelTarget
 from .collection_type import CollectionType
 from .component import Component
 from .connection import Connection
@@ -46,6 +50,7 @@ from .get_grid_yaml_response_200 import GetGridYamlResponse200
 from .get_trajectory_frame import GetTrajectoryFrame
 from .get_trajectory_tum_frame import GetTrajectoryTumFrame
 from .grid import Grid
+from .grid_header import GridHeader
 from .grid_info import GridInfo
 from .hypothesis import Hypothesis
 from .interval import Interval
@@ -74,6 +79,8 @@ from .localization import Localization
 from .localization_page import LocalizationPage
 from .localization_state import LocalizationState
 from .map_ import Map
+from .map_channel import MapChannel
+from .map_channel_page import MapChannelPage
 from .map_run import MapRun
 from .map_statistics import MapStatistics
 from .match import Match
@@ -100,9 +107,14 @@ from .region import Region
 from .registration import Registration
 from .rejection_reason import RejectionReason
 from .retention import Retention
+from .robot_report import RobotReport
 from .room import Room
 from .room_label import RoomLabel
 from .room_page import RoomPage
+from .ros_point import RosPoint
+from .ros_pose import RosPose
+from .ros_quaternion import RosQuaternion
+from .ros_time import RosTime
 from .route import Route
 from .route_step import RouteStep
 from .route_turn import RouteTurn
@@ -130,6 +142,7 @@ from .stored_scan import StoredScan
 from .stored_scan_page import StoredScanPage
 from .trajectory import Trajectory
 from .turn import Turn
+from .vda_map import VdaMap
 from .word import Word
 from .word_answer import WordAnswer
 from .word_id import WordId
@@ -147,6 +160,10 @@ __all__ = (
     "ChangePage",
     "ChangeVisit",
     "Channel",
+    "ChannelMove",
+    "ChannelRobot",
+    "ChannelRobotPage",
+    "ChannelTarget",
     "CollectionType",
     "Component",
     "Connection",
@@ -184,6 +201,7 @@ __all__ = (
     "GetTrajectoryFrame",
     "GetTrajectoryTumFrame",
     "Grid",
+    "GridHeader",
     "GridInfo",
     "Hypothesis",
     "Interval",
@@ -212,6 +230,8 @@ __all__ = (
     "LocalizationPage",
     "LocalizationState",
     "Map",
+    "MapChannel",
+    "MapChannelPage",
     "MapRun",
     "MapStatistics",
     "Match",
@@ -238,9 +258,14 @@ __all__ = (
     "Registration",
     "RejectionReason",
     "Retention",
+    "RobotReport",
     "Room",
     "RoomLabel",
     "RoomPage",
+    "RosPoint",
+    "RosPose",
+    "RosQuaternion",
+    "RosTime",
     "Route",
     "RouteStep",
     "RouteTurn",
@@ -268,6 +293,7 @@ __all__ = (
     "StoredScanPage",
     "Trajectory",
     "Turn",
+    "VdaMap",
     "Word",
     "WordAnswer",
     "WordId",

@@ -7,6 +7,7 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 if TYPE_CHECKING:
+    from ..models.grid_header import GridHeader
     from ..models.grid_info import GridInfo
 
 
@@ -15,18 +16,22 @@ T = TypeVar("T", bound="Grid")
 
 @_attrs_define
 class Grid:
-    """An occupancy grid with the field names of `nav_msgs/OccupancyGrid`.
+    """An occupancy grid, field by field a message of `nav_msgs/OccupancyGrid`.
 
     Attributes:
+        header (GridHeader): `std_msgs/Header`.
         info (GridInfo): `nav_msgs/MapMetaData`.
         data (list[int]): Row by row from the lower left: 0 free, 100 occupied, −1 unknown.
     """
 
+    header: GridHeader
     info: GridInfo
     data: list[int]
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
+        header = self.header.to_dict()
+
         info = self.info.to_dict()
 
         data = self.data
@@ -35,6 +40,7 @@ class Grid:
         field_dict.update(self.additional_properties)
         field_dict.update(
             {
+                "header": header,
                 "info": info,
                 "data": data,
             }
@@ -44,14 +50,18 @@ class Grid:
 
     @classmethod
     def from_dict(cls: type[T], src_dict: Mapping[str, Any]) -> T:
+        from ..models.grid_header import GridHeader  # noqa: PLC0415
         from ..models.grid_info import GridInfo  # noqa: PLC0415
 
         d = dict(src_dict)
+        header = GridHeader.from_dict(d.pop("header"))
+
         info = GridInfo.from_dict(d.pop("info"))
 
         data = cast(list[int], d.pop("data"))
 
         grid = cls(
+            header=header,
             info=info,
             data=data,
         )

@@ -7,7 +7,8 @@ from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
 if TYPE_CHECKING:
-    from ..models.pose import Pose
+    from ..models.ros_pose import RosPose
+    from ..models.ros_time import RosTime
 
 
 T = TypeVar("T", bound="GridInfo")
@@ -18,19 +19,23 @@ class GridInfo:
     """`nav_msgs/MapMetaData`.
 
     Attributes:
+        map_load_time (RosTime): `builtin_interfaces/Time`.
         resolution (float): Metres per cell.
         width (int): Cells.
         height (int): Cells.
-        origin (Pose): A pose in the plane, equally a rigid transform.
+        origin (RosPose): `geometry_msgs/Pose`.
     """
 
+    map_load_time: RosTime
     resolution: float
     width: int
     height: int
-    origin: Pose
+    origin: RosPose
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
+        map_load_time = self.map_load_time.to_dict()
+
         resolution = self.resolution
 
         width = self.width
@@ -43,6 +48,7 @@ class GridInfo:
         field_dict.update(self.additional_properties)
         field_dict.update(
             {
+                "map_load_time": map_load_time,
                 "resolution": resolution,
                 "width": width,
                 "height": height,
@@ -54,18 +60,22 @@ class GridInfo:
 
     @classmethod
     def from_dict(cls: type[T], src_dict: Mapping[str, Any]) -> T:
-        from ..models.pose import Pose  # noqa: PLC0415
+        from ..models.ros_pose import RosPose  # noqa: PLC0415
+        from ..models.ros_time import RosTime  # noqa: PLC0415
 
         d = dict(src_dict)
+        map_load_time = RosTime.from_dict(d.pop("map_load_time"))
+
         resolution = d.pop("resolution")
 
         width = d.pop("width")
 
         height = d.pop("height")
 
-        origin = Pose.from_dict(d.pop("origin"))
+        origin = RosPose.from_dict(d.pop("origin"))
 
         grid_info = cls(
+            map_load_time=map_load_time,
             resolution=resolution,
             width=width,
             height=height,
