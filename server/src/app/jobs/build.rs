@@ -1,7 +1,6 @@
 //! Building the map of a site in the background: load a snapshot, let the engine map it, write a version, serve it.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -9,14 +8,14 @@ use std::time::{Duration, Instant};
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{
-    Channel, Decision, Evidence, Interval, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
-    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, place_observations,
-    weigh_texts,
+    Channel, Decision, Evidence, Interval, Keyframe, MappedRun, MatchState, PlaceMatch, RejectionReason,
+    RunRecord, SiteMap, place_observations,
 };
 use locution_engine::semantics::{MapLabels, MapRooms, RoomsBefore};
 use locution_engine::text::{Observation, Word};
 use sha2::{Digest as _, Sha256};
 
+use super::founded::{MadeFrom, founded_map};
 use crate::app::maps::{
     MapDraft, WrittenRun, drop_versions, keep_annotations, note_made_of, rooms_before, serve_map,
 };
@@ -275,6 +274,17 @@ fn digest_of(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest 
     hasher.finalize().into()
 }
 
+/// The digest of everything that the first runs of a site amount to.
+fn digest_of_settled(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest {
+    let is_within = |decision: &&Decision| {
+        let runs_of_it = [decision.earlier.run_idx, decision.later.run_idx];
+        // A confirmation settles a match, wherever it is; a veto shapes the map.
+        !decision.is_same_place && runs_of_it.iter().all(|run| (*run as usize) < runs.len())
+    };
+    let within: Vec<Decision> = decisions.iter().filter(is_within).copied().collect();
+    digest_of(site, runs, &within)
+}
+
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
@@ -291,30 +301,26 @@ async fn map_runs(
         let rooms = MapRooms { next_id: before.rooms.next_id, ..MapRooms::default() };
         return Ok(MadeMap { map, labels, match_places: Vec::new(), rooms });
     }
-    let mut memo = site.registrations.take(site.store()).await?;
+    let mut memory = site.remembered.take(site.store()).await?;
     let (progress, site) = (Arc::clone(progress), Arc::clone(site));
+    let site_record = site.state().record.clone();
     on_blocking_thread(move || {
-        let told = |step: MapStep| {
-            let stage = match step.stage {
-                MapStage::Settling => BuildStage::Settling,
-                MapStage::Joining => BuildStage::Joining,
-            };
-            match progress.at(stage, step.share) {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(_) => ControlFlow::Break(()),
-            }
-        };
         let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site_watched(&config.mapping, &records, &decisions, &mut memo, Watch::new(&told));
+        let stored: Vec<Run> = runs.iter().map(|run| run.run.clone()).collect();
+        let settled_digest =
+            |num_runs: usize| digest_of_settled(&site_record, &stored[..num_runs], &decisions);
+        let from = MadeFrom {
+            config: &config,
+            runs: &records,
+            decisions: &decisions,
+            settled_digest: &settled_digest,
+        };
+        let outcome = founded_map(&mut memory, &from, &progress);
         // Also when the job was given up meanwhile: whoever goes on takes it up.
-        site.registrations.give_back(memo);
-        let mut map = outcome.map_err(|error| match error {
-            MappingError::Stopped => AppError::Stopping,
-            MappingError::Graph(error) => AppError::internal(error),
-        })?;
+        site.remembered.give_back(memory);
+        let mut map = outcome?;
         progress.at(BuildStage::Weighing, 0.0)?;
         number_driven_first(&records, &mut map);
-        weigh_texts(&records, &mut map, &config.matching);
         map.matches.append(&mut map.refused);
         keep_vetoed_visible(&mut map, &decisions);
         progress.at(BuildStage::Weighing, 0.5)?;
