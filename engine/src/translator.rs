@@ -6,20 +6,33 @@ use crate::config_error::ConfigError;
 use crate::density::DensityEstimator;
 use crate::geometry::Pose2;
 use crate::grid::{Cell, LocalMap};
-use crate::registration::OdometryRefiner;
-use crate::sampling::{KeyframePose, KeyframeSampler, Place, PlaceSampler};
+use crate::registration::{CutReason, OdometryRefiner};
+use crate::sampling::{KeyframePose, Place, PlaceSampler};
 use crate::scan::{Scan, ScanGeometry};
 use crate::text::{Observation, Quantizer, TextBuilder, Word};
 
 mod config;
+mod raw_odometry;
 
 pub use config::{OdometrySource, TranslatorConfig};
+use raw_odometry::RawOdometry;
+
+/// A place where a run falls in two: nothing tells how what was driven from there on lies to what was driven before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Cut {
+    /// Sequence number of the first scan behind it.
+    pub scan_seq: u64,
+    /// What could not be bridged.
+    pub reason: CutReason,
+}
 
 /// What one scan, or the end of a run, added.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Translation {
-    /// Pose of the scan in the run's frame.
+    /// Pose of the scan in the run's frame; behind a cut that is another one.
     pub run_from_robot: Pose2,
+    /// Set when the scan is the first behind a cut; what was held back of the piece before stands first then.
+    pub cut: Option<Cut>,
     /// Set when the scan is a keyframe.
     pub keyframe: Option<KeyframePose>,
     /// New observations, in order of travel.
@@ -49,7 +62,7 @@ pub struct Translator {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 enum Odometry {
     /// As sent.
-    Raw(KeyframeSampler),
+    Raw(Box<RawOdometry>),
     /// Registered against the recent scans.
     Refined(Box<OdometryRefiner>),
 }
@@ -57,21 +70,36 @@ enum Odometry {
 impl Odometry {
     fn new(config: &TranslatorConfig) -> Self {
         match config.odometry {
-            OdometrySource::Raw => Self::Raw(KeyframeSampler::new(&config.sampling)),
+            OdometrySource::Raw => Self::Raw(Box::new(RawOdometry::new(config))),
             OdometrySource::Refined => Self::Refined(Box::new(OdometryRefiner::new(&config.refiner))),
         }
     }
 
-    /// Pose of the next scan in the run's frame and, if it is a keyframe, the covariance of the motion since the last.
-    fn pose(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<[[f64; 3]; 3]>) {
+    /// Moves on to the next scan.
+    fn pose(&mut self, geometry: &ScanGeometry, scan: &Scan) -> ScanPose {
         match self {
-            Self::Raw(keyframes) => (scan.odom_from_robot, keyframes.drive(&scan.odom_from_robot)),
+            Self::Raw(odometry) => odometry.pose(scan),
             Self::Refined(refiner) => {
                 let refined = refiner.refine(geometry, scan);
-                (refined.run_from_robot, refined.keyframe.map(|motion| motion.motion_covariance))
+                ScanPose {
+                    run_from_robot: refined.run_from_robot,
+                    keyframe_covariance: refined.keyframe.map(|motion| motion.motion_covariance),
+                    cut: refined.cut,
+                    is_doubtful: refined.is_doubtful,
+                }
             }
         }
     }
+}
+
+/// Where a scan was taken.
+struct ScanPose {
+    run_from_robot: Pose2,
+    /// If it is a keyframe, the covariance of the motion since the last.
+    keyframe_covariance: Option<[[f64; 3]; 3]>,
+    cut: Option<CutReason>,
+    /// True when the pose is a guess.
+    is_doubtful: bool,
 }
 
 impl Translator {
@@ -112,44 +140,62 @@ impl Translator {
         let scan_seq = self.next_scan_seq;
         self.next_scan_seq += 1;
         // Pose: odometry as sent, or refined against the recent scans.
-        let (run_from_robot, motion_covariance) = self.odometry.pose(&self.geometry, scan);
-        self.run_from_robot = run_from_robot;
-        let keyframe = motion_covariance.map(|motion_covariance| KeyframePose {
+        let pose = self.odometry.pose(&self.geometry, scan);
+        let cut = pose.cut.map(|reason| Cut { scan_seq, reason });
+        let (mut observations, mut words) = if cut.is_some() { self.end_piece() } else { Default::default() };
+        self.run_from_robot = pose.run_from_robot;
+        let keyframe = pose.keyframe_covariance.map(|motion_covariance| KeyframePose {
             scan_seq,
             timestamp_ns: scan.timestamp_ns,
             odom_from_robot: scan.odom_from_robot,
-            run_from_robot,
+            run_from_robot: pose.run_from_robot,
             motion_covariance,
         });
-        // Local map.
-        self.local_map.integrate_scan(&scan.ranges_m, &self.run_from_robot);
-        // Density and frontiers make an observation, of the places that lie the delay behind.
-        self.places.drive(Place {
-            scan_seq,
-            timestamp_ns: scan.timestamp_ns,
-            travel_m: 0.0,
-            odom_from_robot: scan.odom_from_robot,
-            run_from_robot: self.run_from_robot,
-        });
-        let mut observations = Vec::new();
-        while let Some(place) = self.places.next_ready() {
-            observations.push(self.observe(place));
+        if !pose.is_doubtful {
+            // Local map.
+            self.local_map.integrate_scan(&scan.ranges_m, &self.run_from_robot);
+            // Density and frontiers make an observation, of the places that lie the delay behind.
+            self.places.drive(Place {
+                scan_seq,
+                timestamp_ns: scan.timestamp_ns,
+                travel_m: 0.0,
+                odom_from_robot: scan.odom_from_robot,
+                run_from_robot: self.run_from_robot,
+            });
         }
-        // Observations make regions, regions make words of all levels.
-        let words = observations.iter().flat_map(|observation| self.text.push(observation)).collect();
-        Translation { run_from_robot: self.run_from_robot, keyframe, observations, words }
+        while let Some(place) = self.places.next_ready() {
+            // Observations make regions, regions make words of all levels.
+            let observation = self.observe(place);
+            words.extend(self.text.push(&observation));
+            observations.push(observation);
+        }
+        Translation { run_from_robot: self.run_from_robot, cut, keyframe, observations, words }
     }
 
-    /// Ends the run: observes the places still within the delay as far as they are known, and writes the last word.
-    pub fn finish(&mut self) -> Translation {
+    /// Brings out what was held back, and begins anew.
+    fn end_piece(&mut self) -> (Vec<Observation>, Vec<Word>) {
+        let (observations, mut words) = self.observe_waiting();
+        words.extend(self.text.cut());
+        self.places.restart();
+        self.local_map = LocalMap::new(&self.config.local_map, &self.geometry);
+        (observations, words)
+    }
+
+    /// The places still within the delay, as far as they are known, and the words that they complete.
+    fn observe_waiting(&mut self) -> (Vec<Observation>, Vec<Word>) {
         let mut observations = Vec::new();
         while let Some(place) = self.places.next_waiting() {
             observations.push(self.observe(place));
         }
-        let mut words: Vec<Word> =
-            observations.iter().flat_map(|observation| self.text.push(observation)).collect();
+        let words = observations.iter().flat_map(|observation| self.text.push(observation)).collect();
+        (observations, words)
+    }
+
+    /// Ends the run: observes the places still within the delay as far as they are known, and writes the last word.
+    pub fn finish(&mut self) -> Translation {
+        let (observations, mut words) = self.observe_waiting();
         words.extend(self.text.finish());
-        Translation { run_from_robot: self.run_from_robot, keyframe: None, observations, words }
+        Translation { run_from_robot: self.run_from_robot, cut: None, keyframe: None, observations, words }
     }
 
     /// The partition that the text is written with.

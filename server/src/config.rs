@@ -90,7 +90,8 @@ pub struct LimitsConfig {
     pub num_ranges_per_scan_max: usize,
     /// Most runs in one site.
     pub num_runs_per_site_max: u32,
-    /// Farthest the odometry may move from one scan to the next, metres; more is a teleport and refused.
+    /// Farthest the odometry may move from one scan to the next, metres, when there was no time for more; what goes beyond
+    /// is a teleport and refused, but for odometry that begins at zero again.
     pub odometry_step_max_m: f64,
     /// Most requests being served at once; more are refused with 503.
     pub num_requests_max: usize,

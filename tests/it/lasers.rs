@@ -206,3 +206,63 @@ async fn the_rate_of_a_gyroscope_is_kept() {
     assert_eq!(problem["field"], "scans[1].angular_velocity_rad_per_s");
     server.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_robot_that_is_carried_has_a_run_in_pieces() {
+    let server = TestServer::start().await;
+    let api = &server.api;
+    make(api, "r", &geometry()).await.ok();
+    // It stops in the first corridor, is carried with its laser covered, and drives on in the second.
+    let driven = drive(560, 4);
+    let mut scans = driven[..160].to_vec();
+    let stopped = scans[159].clone();
+    for _ in 0..10 {
+        let mut blind = stopped.clone();
+        blind["ranges_m"].as_array_mut().unwrap().fill(Value::Null);
+        scans.push(blind);
+    }
+    scans.extend_from_slice(&driven[230..]);
+    for (idx, scan) in scans.iter_mut().enumerate() {
+        scan["timestamp_ns"] = json!(idx as i64 * 100_000_000);
+    }
+    api.post_all("a", "r", &scans, 125).await;
+    let pieces = api.get("/v1/sites/a/runs/r/pieces").await.ok();
+    let told = |pieces: &Value| -> Vec<(u64, u64, Value)> {
+        let piece = |piece: &Value| {
+            (
+                piece["from_scan"].as_u64().unwrap(),
+                piece["to_scan"].as_u64().unwrap(),
+                piece["reason"].clone(),
+            )
+        };
+        pieces["items"].as_array().unwrap().iter().map(piece).collect()
+    };
+    let [(0, end, first), (start, last, reason)] = &told(&pieces)[..] else { panic!("{pieces}") };
+    assert_eq!((end + 1, *last, first), (*start, scans.len() as u64 - 1, &Value::Null));
+    assert!((170..176).contains(start), "{pieces}");
+    assert!(reason == "jump" || reason == "no_returns", "{pieces}");
+    assert!(pieces["items"].as_array().unwrap().iter().all(|piece| piece["component"].is_null()));
+    api.post("/v1/sites/a/runs/r/finish", &json!({})).await.ok();
+    api.post("/v1/sites/a/builds?wait=true", &json!({})).await.ok();
+    // Both pieces are in the map, and what is served of the map says of each where it lies.
+    let pieces = api.get("/v1/sites/a/runs/r/pieces").await.ok();
+    let components: Vec<u64> = (pieces["items"].as_array().unwrap().iter())
+        .map(|piece| piece["component"].as_u64().unwrap_or_else(|| panic!("{pieces}")))
+        .collect();
+    let map = api.get("/v1/sites/a/map").await.ok();
+    let of_map: Vec<(u64, u64)> = (map["runs"].as_array().unwrap().iter())
+        .map(|run| (run["first_scan"].as_u64().unwrap(), run["component"].as_u64().unwrap()))
+        .collect();
+    assert_eq!(of_map, [(0, components[0]), (*start, components[1])]);
+    let poses = |component: u64| async move {
+        let path = format!("/v1/sites/a/runs/r/trajectory?frame=map&component={component}");
+        api.get(&path).await.ok()["poses"].as_array().unwrap().len() as u64
+    };
+    let is_one = components[0] == components[1];
+    let expected = if is_one { scans.len() as u64 } else { *start };
+    assert_eq!(poses(components[0]).await, expected);
+    if !is_one {
+        assert_eq!(poses(components[1]).await, scans.len() as u64 - start);
+    }
+    server.stop().await;
+}

@@ -108,7 +108,11 @@ test("the map is moved, and its address brings one back", async () => {
 
 test("all layers are shown and explained", async () => {
   await visit("#/sites/office/map");
-  for (const name of ["Rooms", "Places", "Words under the path", "Labels", "Changes", "rejected"]) await page.getByRole("checkbox", { name }).check();
+  await page.getByRole("checkbox", { name: "Rooms" }).check();
+  await until(async () => (await page.locator(".note").count()) === 0, "rooms are loaded");
+  await page.waitForTimeout(300);
+  await picture(page, "rooms");
+  for (const name of ["Places", "Words under the path", "Labels", "Changes", "rejected"]) await page.getByRole("checkbox", { name }).check();
   for (const text of ["porter", "door between rooms", "narrow 0", "verified match", "rejected match", "corridor", "disappeared"]) {
     await page.locator(".legend").getByText(text, { exact: true }).waitFor();
   }
@@ -146,12 +150,14 @@ test("a room is named, and a thing put onto the map and taken away", async () =>
   await pressEnterAt(room.centre, "walls,rooms");
   await page.getByLabel("What people call it").fill("Great hall");
   await page.getByRole("button", { name: "Name it" }).click();
+  await page.locator(".note").waitFor({ state: "detached" });
   await until(async () => (await rooms()).some(({ id, name }) => id === room.id && name === "Great hall"), "the room has its name");
   // Another name replaces the first.
   await pressEnterAt(room.centre, "walls,rooms");
   await page.locator(".note strong").getByText("Great hall").waitFor();
   await page.getByLabel("What people call it").fill("Small hall");
   await page.getByRole("button", { name: "Name it" }).click();
+  await page.locator(".note").waitFor({ state: "detached" });
   await until(async () => (await rooms()).some(({ id, name }) => id === room.id && name === "Small hall"), "the room has its other name");
   const annotations = async () => (await ask(server.direct, "/v1/sites/office/annotations")).items.map(({ kind, name }) => `${kind} ${name}`);
   assert.deepEqual(await annotations(), ["room Small hall"]);

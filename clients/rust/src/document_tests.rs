@@ -83,12 +83,12 @@ fn bodies_have_every_member_of_the_document() {
         )*};
     }
     check! {
-        Annotation Change ChangeKind ChangeVisit ChangedSite Channel ChannelMove ChannelRobot ChannelTarget Component Connection ConnectionKind DecisionKind Direction Door Event
+        Annotation Change ChangeKind ChangeVisit ChangedSite Channel ChannelMove ChannelRobot ChannelTarget Component Connection ConnectionKind CutReason DecisionKind Direction Door Event
         Evidence ExampleAnswer ExampleEvidence ExamplePlace Geometry Grid GridHeader GridInfo Hypothesis Interval IssuedKey Job JobKind
         JobState Key Keys KeyframePose Label LabelAnswer LabelPattern LabelQuery Localization LocalizationState Map
         MapChannel MapRun MapStatistics Match MatchState Missing NewAnnotation NewKey NewLocalization NewRun Observation Place PlaceLabel Point
         Pose PosePrior Receipt Region Registration RejectionReason Retention Room RoomLabel Route RouteStep RouteTurn Run
-        RunChange RunState Scan Shape Site SiteChange SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word
+        RunChange RunPiece RunState Scan Shape Site SiteChange SiteState SiteSummary StampedPose StoredScan Trajectory Turn Word
         RobotReport RosPoint RosPose RosQuaternion RosTime Scope VdaMap WordAnswer WordId WordPattern WordQuery
     }
     assert_complete::<error::Problem>(&document, "Problem");

@@ -83,6 +83,7 @@ routes! {
     MAKE_RUN "make_run" PUT "/v1/sites/{site}/runs/{run}";
     DELETE_RUN "delete_run" DELETE "/v1/sites/{site}/runs/{run}";
     FINISH_RUN "finish_run" POST "/v1/sites/{site}/runs/{run}/finish";
+    LIST_PIECES "list_pieces" GET "/v1/sites/{site}/runs/{run}/pieces";
     APPEND_BATCH "append_batch" POST "/v1/sites/{site}/runs/{run}/batches";
     LIST_SCANS "list_scans" GET "/v1/sites/{site}/runs/{run}/scans";
     LIST_OBSERVATIONS "list_observations" GET "/v1/sites/{site}/runs/{run}/observations";

@@ -3,7 +3,7 @@
 use crate::client::{Body, Client};
 use crate::error::ClientError;
 use crate::routes::{self, Query};
-use crate::types::{Frame, Job, NewRun, Observation, Run, StoredScan, Trajectory, Word};
+use crate::types::{Frame, Job, NewRun, Observation, Run, RunPiece, StoredScan, Trajectory, Word};
 
 impl Client {
     /// Makes a run, or finds it as it stands.
@@ -44,6 +44,14 @@ impl Client {
     /// See [`ClientError`].
     pub async fn finish_run(&self, site: &str, run: &str) -> Result<Run, ClientError> {
         self.answer(&routes::FINISH_RUN, &[site, run], &Query::default(), Body::Empty).await
+    }
+
+    /// The pieces that a run falls in where it could not be followed, with their places in the serving map.
+    ///
+    /// # Errors
+    /// See [`ClientError`].
+    pub async fn run_pieces(&self, site: &str, run: &str) -> Result<Vec<RunPiece>, ClientError> {
+        self.all(&routes::LIST_PIECES, &[site, run], Query::default()).await
     }
 
     /// All stored scans of a run.

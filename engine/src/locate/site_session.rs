@@ -154,6 +154,12 @@ impl SiteSession {
     /// Takes the next scan.
     pub fn push(&mut self, scan: &Scan) {
         let refined = self.refiner.refine(&self.geometry, scan);
+        if refined.cut.is_some() {
+            // Nothing tells where it was carried: what it saw before does not count any more.
+            self.start_anew(self.travel_m);
+            self.forget(self.moments.len());
+            self.run_from_start = None;
+        }
         self.run_from_robot = refined.run_from_robot;
         self.run_from_start.get_or_insert(refined.run_from_robot);
         self.recent.push(scan);
@@ -456,13 +462,12 @@ impl SiteSession {
             0
         };
         if self.num_contradictions >= settings.num_contradictions_max {
-            self.start_anew();
+            self.start_anew(self.travel_m - self.settings().recent_m);
         }
     }
 
     /// A robot that was carried away contradicts its place all at once; then only what it saw since counts.
-    fn start_anew(&mut self) {
-        let recent_m = self.travel_m - self.settings().recent_m;
+    fn start_anew(&mut self, recent_m: f64) {
         self.forget(self.moments.partition_point(|moment| moment.travel_m < recent_m));
         self.parts.iter_mut().for_each(|part| part.tracks.clear());
         self.began_at_m = recent_m;

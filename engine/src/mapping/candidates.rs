@@ -27,24 +27,33 @@ pub(crate) struct Candidate {
 /// Profile candidates between different runs, at most one for a pair of anchors and a direction, in order of anchors.
 ///
 /// Every two runs are compared on their own: among the runs of many buildings those of other buildings would take the
-/// few places that each window has to give. Of every two runs the best `max_candidates_per_pair` are kept.
+/// few places that each window has to give. The pieces of a body are one building, and are compared with a run together;
+/// those of two bodies were compared when they were new. Of every two the best `max_candidates_per_pair` are kept.
 pub(crate) fn candidates_across(site: &SiteAnchors<'_>) -> Vec<Candidate> {
     let spacing_m = site.config.retrieval.sample_spacing_m;
     let profiles: Vec<RunProfile> = site
         .runs()
         .map(|run| RunProfile::from_observations(site.record(run).observations, spacing_m))
         .collect();
-    let pairs: Vec<(RunIdx, RunIdx)> = site
+    let mut hosts: Vec<Vec<RunIdx>> = Vec::new();
+    for run in site.runs() {
+        match hosts.last_mut().filter(|host| site.are_settled(host[0], run)) {
+            Some(host) => host.push(run),
+            None => hosts.push(vec![run]),
+        }
+    }
+    let is_later = |host: &[RunIdx], later: RunIdx| site.body_of(later).is_none() && host[0] < later;
+    let pairs: Vec<(&[RunIdx], RunIdx)> = site
         .runs()
-        .flat_map(|later| {
-            site.runs().filter(move |&earlier| earlier < later).map(move |earlier| (earlier, later))
-        })
+        .flat_map(|later| hosts.iter().map(move |host| (host.as_slice(), later)))
+        .filter(|(host, later)| is_later(host, *later))
         .collect();
-    let of_pair = |&(earlier, later): &(RunIdx, RunIdx)| {
-        let pair = vec![profiles[earlier.at()].clone(), profiles[later.at()].clone()];
-        let index = ProfileIndex::build(pair, site.config.retrieval.clone());
-        let across = index.all_candidates(1).into_iter().filter(|found| found.earlier.run_idx == 0);
-        let named = across.filter_map(|mut profile| {
+    let of_pair = |&(host, later): &(&[RunIdx], RunIdx)| {
+        let compared = host.iter().chain([&later]).map(|run| profiles[run.at()].clone()).collect();
+        let index = ProfileIndex::build(compared, site.config.retrieval.clone());
+        let found = index.all_candidates(host.len()).into_iter();
+        let named = found.filter_map(|mut profile| {
+            let earlier = *host.get(profile.earlier.run_idx as usize)?;
             profile.earlier.run_idx = earlier.at() as u32;
             profile.later.run_idx = later.at() as u32;
             to_anchors(site, (earlier, later), profile)

@@ -2,8 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use nalgebra::Matrix3;
-
 use super::coarse_graph::Closure;
 use super::component::Component;
 use super::indices::{AnchorIdx, RunIdx};
@@ -148,22 +146,17 @@ fn in_told_order(site: &SiteAnchors<'_>, closure: &Closure) -> (AnchorIdx, Ancho
 
 /// A closure as it is served.
 fn registration_of(site: &SiteAnchors<'_>, closure: &Closure) -> Registration {
-    let (earlier, later) = in_told_order(site, closure);
     let fit = &closure.fit;
-    let (earlier_from_later, covariance) = if earlier == closure.earlier {
-        (fit.earlier_from_later, fit.covariance)
-    } else {
-        let inverse = fit.earlier_from_later.inverse();
-        let (sin, cos) = fit.earlier_from_later.theta.sin_cos();
-        let by_pose = Matrix3::new(-cos, -sin, inverse.y, sin, -cos, -inverse.x, 0.0, 0.0, -1.0);
-        (inverse, by_pose * fit.covariance * by_pose.transpose())
-    };
-    Registration {
-        earlier_keyframe: site.anchor(earlier).keyframe.number(),
-        later_keyframe: site.anchor(later).keyframe.number(),
-        earlier_from_later,
-        covariance: covariance.transpose().into(),
+    let registered = Registration {
+        earlier_keyframe: site.anchor(closure.earlier).keyframe.number(),
+        later_keyframe: site.anchor(closure.later).keyframe.number(),
+        earlier_from_later: fit.earlier_from_later,
+        covariance: fit.covariance.transpose().into(),
         agreement: fit.agreement,
+    };
+    match in_told_order(site, closure).0 == closure.earlier {
+        true => registered,
+        false => registered.seen_from_later(),
     }
 }
 

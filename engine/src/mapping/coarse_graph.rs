@@ -1,8 +1,12 @@
 //! The graph of anchors of some runs: odometry between neighbors, closures between places driven twice.
+//!
+//! A body of the foundation is one node, however many anchors it has: they keep their places in it.
 
-use nalgebra::{Matrix3, Vector3};
+use std::collections::BTreeMap;
 
-use super::indices::{AnchorIdx, RunIdx};
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+use super::indices::{AnchorIdx, BodyIdx, RunIdx};
 use super::site_anchors::SiteAnchors;
 use crate::geometry::Pose2;
 use crate::pose_graph::{
@@ -29,28 +33,44 @@ pub(crate) struct CoarseGraph<'a> {
     runs: Vec<RunIdx>,
     /// Ascending.
     members: Vec<AnchorIdx>,
-    /// For each run of the site the node of its first anchor, if it belongs.
+    /// For each run of the site the node of its first anchor, or that of its body, if it belongs.
     first_nodes: Vec<Option<usize>>,
     graph: PoseGraph,
 }
 
 impl<'a> CoarseGraph<'a> {
-    /// Runs with the poses that their anchors have; nothing is optimized yet.
+    /// Runs with the poses that their anchors have, pieces with that of their body; nothing is optimized yet.
+    ///
+    /// All pieces of a body must be among the runs or none.
     pub fn new(
         site: &'a SiteAnchors<'a>,
         mut runs: Vec<RunIdx>,
         pose_of: impl Fn(AnchorIdx) -> Pose2,
+        pose_of_body: impl Fn(RunIdx) -> Pose2,
     ) -> Result<Self, PoseGraphError> {
         runs.sort_unstable();
         let mut members = Vec::new();
         let mut first_nodes = vec![None; site.runs().len()];
-        for &run in &runs {
-            first_nodes[run.at()] = Some(members.len());
-            members.extend(site.of_run(run).map(AnchorIdx::new));
-        }
+        let mut nodes_of_bodies: BTreeMap<BodyIdx, usize> = BTreeMap::new();
         let mut graph = PoseGraph::new();
-        for &anchor in &members {
-            graph.add_pose(pose_of(anchor))?;
+        for &run in &runs {
+            let anchors = site.of_run(run).map(AnchorIdx::new);
+            members.extend(anchors.clone());
+            let next = graph.poses().len();
+            match site.body_of(run).map(|body| *nodes_of_bodies.entry(body).or_insert(next)) {
+                Some(node) => {
+                    first_nodes[run.at()] = Some(node);
+                    if node == next {
+                        graph.add_pose(pose_of_body(run))?;
+                    }
+                }
+                None => {
+                    first_nodes[run.at()] = Some(next);
+                    for anchor in anchors {
+                        graph.add_pose(pose_of(anchor))?;
+                    }
+                }
+            }
         }
         Ok(Self { site, runs, members, first_nodes, graph })
     }
@@ -72,7 +92,18 @@ impl<'a> CoarseGraph<'a> {
 
     /// Where an anchor of it lies.
     pub fn pose(&self, anchor: AnchorIdx) -> Pose2 {
-        self.graph.poses()[self.node(anchor)]
+        let pose = self.graph.poses()[self.node(anchor)];
+        self.in_body(anchor).map_or(pose, |body_from_anchor| pose.compose(&body_from_anchor))
+    }
+
+    /// Where the body of a piece lies.
+    pub fn pose_of_body(&self, piece: RunIdx) -> Pose2 {
+        self.graph.poses()[self.first_node(piece)]
+    }
+
+    /// Where an anchor lies in its body, if it has one.
+    fn in_body(&self, anchor: AnchorIdx) -> Option<Pose2> {
+        self.site.body_of(self.site.run_of(anchor)).map(|_| self.site.anchor(anchor).run_from_anchor)
     }
 
     /// Anchors of it with their poses.
@@ -81,10 +112,16 @@ impl<'a> CoarseGraph<'a> {
     }
 
     /// Node of an anchor of it.
-    pub fn node(&self, anchor: AnchorIdx) -> usize {
+    fn node(&self, anchor: AnchorIdx) -> usize {
         let run = self.site.run_of(anchor);
-        let first = self.first_nodes[run.at()].expect("only anchors of the graph's runs are asked for");
-        first + anchor.at() - self.site.of_run(run).start
+        match self.site.body_of(run) {
+            Some(_) => self.first_node(run),
+            None => self.first_node(run) + anchor.at() - self.site.of_run(run).start,
+        }
+    }
+
+    fn first_node(&self, run: RunIdx) -> usize {
+        self.first_nodes[run.at()].expect("only the graph's own runs are asked for")
     }
 
     /// Optimizes all poses under these closures; those that contradict the rest lose their weight.
@@ -98,18 +135,18 @@ impl<'a> CoarseGraph<'a> {
         for pose in self.graph.poses() {
             graph.add_pose(*pose)?;
         }
-        for pair in
-            self.members.windows(2).filter(|pair| self.site.run_of(pair[0]) == self.site.run_of(pair[1]))
-        {
+        let is_driven = |pair: &&[AnchorIdx]| {
+            let run = self.site.run_of(pair[0]);
+            run == self.site.run_of(pair[1]) && self.site.body_of(run).is_none()
+        };
+        for pair in self.members.windows(2).filter(is_driven) {
             let motion = self.site.step(pair[0], pair[1]);
             let covariance = self.site.step_covariance(pair[0]);
             graph.add_constraint(constraint(self.node(pair[0]), self.node(pair[1]), motion, covariance))?;
         }
         let num_odometry = graph.constraints().len();
         for closure in closures {
-            let covariance = self.with_floor(&closure.fit.covariance);
-            let (i, j) = (self.node(closure.earlier), self.node(closure.later));
-            graph.add_doubtful(constraint(i, j, closure.fit.earlier_from_later, &covariance))?;
+            graph.add_doubtful(self.constraint_of(closure))?;
         }
         let config = self.site.config;
         let report = optimize_robust(&mut graph, &config.pose_graph, &config.robust)?;
@@ -125,12 +162,57 @@ impl<'a> CoarseGraph<'a> {
         deviation2(&closure.fit.earlier_from_later, &relative, &covariance)
     }
 
-    /// Answers how sure the graph is of relative poses, by node; only after [`CoarseGraph::optimize`].
+    /// Poses of others seen from an anchor, each with the covariance of (x, y, θ) in the axes of that anchor; only after
+    /// [`CoarseGraph::optimize`]. In the order of the questions.
     ///
     /// # Errors
     /// Whatever the factorization cannot solve.
-    pub fn covariances(&self) -> Result<CovarianceSolver, PoseGraphError> {
-        CovarianceSolver::new(&self.graph)
+    pub fn relatives(
+        &self,
+        questions: &[(AnchorIdx, Vec<AnchorIdx>)],
+    ) -> Result<Vec<Vec<(Pose2, Matrix3<f64>)>>, PoseGraphError> {
+        let node = |anchor: AnchorIdx| self.node(anchor) as u32;
+        let of_nodes: Vec<(u32, Vec<u32>)> = (questions.iter())
+            .map(|(anchor, others)| (node(*anchor), others.iter().map(|&other| node(other)).collect()))
+            .collect();
+        let mut relatives = CovarianceSolver::new(&self.graph)?.relatives(&of_nodes)?;
+        for ((anchor, others), relatives) in questions.iter().zip(&mut relatives) {
+            for (&other, relative) in others.iter().zip(relatives) {
+                if let Some(body_from_other) = self.in_body(other) {
+                    *relative = carried_on(relative, &body_from_other);
+                }
+                if let Some(body_from_anchor) = self.in_body(*anchor) {
+                    let (seen, covariance) = &relative;
+                    let turned = crate::registration::rotated(covariance, -body_from_anchor.theta);
+                    *relative = (body_from_anchor.between(seen), turned);
+                }
+            }
+        }
+        Ok(relatives)
+    }
+
+    /// What a closure says of two nodes. Where an anchor lies in a body, the same is said of the body: the fit carried on
+    /// to where the body's frame has its origin.
+    fn constraint_of(&self, closure: &Closure) -> PoseConstraint {
+        let covariance = self.with_floor(&closure.fit.covariance);
+        let (i, j) = (self.node(closure.earlier), self.node(closure.later));
+        let fit = closure.fit.earlier_from_later;
+        let mut of_anchors = constraint(i, j, fit, &covariance);
+        if let Some(body_from_earlier) = self.in_body(closure.earlier) {
+            // The error counts in the axes of the later anchor, which stay.
+            of_anchors.i_from_j = body_from_earlier.compose(&of_anchors.i_from_j);
+        }
+        if let Some(body_from_later) = self.in_body(closure.later) {
+            of_anchors.i_from_j = of_anchors.i_from_j.compose(&body_from_later.inverse());
+            let (sin, cos) = body_from_later.theta.sin_cos();
+            let lever = Vector2::new(-body_from_later.y, body_from_later.x);
+            let lever = Vector2::new(cos * lever.x + sin * lever.y, cos * lever.y - sin * lever.x);
+            // The error at the anchor, by that of the body.
+            let by_body = Matrix3::new(cos, sin, lever.x, -sin, cos, lever.y, 0.0, 0.0, 1.0);
+            let information = by_body.transpose() * of_anchors.information.as_matrix() * by_body;
+            of_anchors.information = positive(&information);
+        }
+        of_anchors
     }
 
     /// The covariance of a fit, with what registration itself cannot know.
@@ -159,8 +241,20 @@ fn constraint(i: usize, j: usize, i_from_j: Pose2, covariance: &Matrix3<f64>) ->
     let turned = crate::registration::rotated(covariance, -i_from_j.theta);
     let symmetric = (turned + turned.transpose()) * 0.5;
     let information = symmetric.try_inverse().unwrap_or_else(|| Matrix3::identity() * 1e-6);
-    let information = InformationMatrix::try_new((information + information.transpose()) * 0.5)
+    PoseConstraint { i: i as u32, j: j as u32, i_from_j, information: positive(&information) }
+}
+
+/// The information that a matrix is meant to be, or hardly any.
+fn positive(information: &Matrix3<f64>) -> InformationMatrix {
+    InformationMatrix::try_new((information + information.transpose()) * 0.5)
         .or_else(|_| InformationMatrix::from_standard_deviations(1.0, 1.0, 1.0))
-        .expect("unit deviations make a positive definite matrix");
-    PoseConstraint { i: i as u32, j: j as u32, i_from_j, information }
+        .expect("unit deviations make a positive definite matrix")
+}
+
+/// An uncertain pose carried on by a sure one.
+fn carried_on((pose, covariance): &(Pose2, Matrix3<f64>), step: &Pose2) -> (Pose2, Matrix3<f64>) {
+    let there = pose.compose(step);
+    let (dx, dy) = (there.x - pose.x, there.y - pose.y);
+    let by_pose = Matrix3::new(1.0, 0.0, -dy, 0.0, 1.0, dx, 0.0, 0.0, 1.0);
+    (there, by_pose * covariance * by_pose.transpose())
 }

@@ -1,8 +1,10 @@
 //! Runs that hang together, with the closures that hold them: they settle, and they are laid over each other.
 
+use rayon::prelude::*;
+
 use super::coarse_graph::{Closure, CoarseGraph};
 use super::guided::{Looked, guided_round};
-use super::indices::{AnchorIdx, RunIdx};
+use super::indices::{AnchorIdx, BodyIdx, RunIdx};
 use super::join_evidence::{JoinEvidence, contradiction, max_contradiction};
 use super::judgements::Judgements;
 use super::memo::RegistrationMemo;
@@ -11,6 +13,7 @@ use super::refusals::Refusal;
 use super::site_anchors::SiteAnchors;
 use super::watch::{MappingError, Span};
 use super::ways::Way;
+use crate::geometry::Pose2;
 use crate::registration::Opinions;
 
 /// How often two components that are laid over each other are extended to where they run beside each other.
@@ -29,6 +32,9 @@ pub(crate) struct Component<'a> {
     pub refused: Vec<Refusal>,
     /// What is known of its pairs of anchors.
     looked: Looked,
+    /// What its places said of each other when they were settled, if it holds a body of the foundation: then it is not
+    /// asked again, whatever is new.
+    settled: Option<Opinions>,
 }
 
 /// What stays the same while a map is being built, and which part of that is at hand.
@@ -52,17 +58,43 @@ impl<'a> Component<'a> {
     ///
     /// # Errors
     /// Whatever the graph cannot solve; [`MappingError::Stopped`].
-    pub fn alone(workshop: Workshop<'a>, run: RunIdx) -> Result<Self, MappingError> {
+    fn alone(workshop: Workshop<'a>, run: RunIdx) -> Result<Self, MappingError> {
         let site = workshop.site;
-        let mut graph = CoarseGraph::new(site, vec![run], |anchor| site.anchor(anchor).run_from_anchor)?;
+        let pose_of = |anchor| site.anchor(anchor).run_from_anchor;
+        let mut graph = CoarseGraph::new(site, vec![run], pose_of, |_| Pose2::identity())?;
         graph.optimize(&[])?;
-        let mut component = Self::new(graph, Looked::default());
+        let mut component = Self::new(graph, None);
         component.settle(workshop)?;
         Ok(component)
     }
 
-    fn new(graph: CoarseGraph<'a>, looked: Looked) -> Self {
-        Self { graph, closures: Vec::new(), refused: Vec::new(), looked }
+    /// Every run on its own, settled, apart from the foundation.
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve; [`MappingError::Stopped`].
+    pub fn all_alone(workshop: Workshop<'a>) -> Result<Vec<Self>, MappingError> {
+        let driven = workshop.site.driven();
+        (driven.par_iter().enumerate())
+            .map(|(idx, &run)| Self::alone(workshop.part(idx, driven.len()), run))
+            .collect()
+    }
+
+    /// A body of the foundation, where it lies, with what its pieces said of each other.
+    ///
+    /// # Errors
+    /// Poses that are not finite.
+    pub fn of_body(
+        site: &'a SiteAnchors<'a>,
+        body: BodyIdx,
+        settled: Opinions,
+    ) -> Result<Self, MappingError> {
+        let pose_of = |anchor| site.anchor(anchor).run_from_anchor;
+        let graph = CoarseGraph::new(site, site.pieces_of(body), pose_of, |_| Pose2::identity())?;
+        Ok(Self::new(graph, Some(settled)))
+    }
+
+    fn new(graph: CoarseGraph<'a>, settled: Option<Opinions>) -> Self {
+        Self { graph, closures: Vec::new(), refused: Vec::new(), looked: Looked::default(), settled }
     }
 
     /// Guided matching and optimization in turns, until nothing new is found.
@@ -96,12 +128,25 @@ impl<'a> Component<'a> {
     /// Share of the returns that its places contradict where it was driven again, in the direction in which it is less;
     /// 0 when it never came back to a place.
     pub fn own_contradiction(&self, workshop: Workshop<'_>) -> f64 {
+        let never_came_back = match self.settled {
+            Some(settled) => settled == Opinions::default(),
+            None => self.closures.is_empty(),
+        };
+        if never_came_back { 0.0 } else { self.own_opinions(workshop).one_sided_contradiction() }
+    }
+
+    fn own_opinions(&self, workshop: Workshop<'_>) -> Opinions {
+        self.settled.unwrap_or_else(|| self.opinions(workshop))
+    }
+
+    /// What its places say of each other where closures hold them together.
+    pub fn opinions(&self, workshop: Workshop<'_>) -> Opinions {
         let mut opinions = Opinions::default();
         for Closure { earlier, later, .. } in &self.closures {
             let relative = self.graph.pose(*earlier).between(&self.graph.pose(*later));
             opinions += workshop.memo.opinions(workshop.site, (*earlier, *later), &relative);
         }
-        if self.closures.is_empty() { 0.0 } else { opinions.one_sided_contradiction() }
+        opinions
     }
 
     /// Two components in one frame as a way says, extended to wherever they then run beside each other, with what
@@ -116,7 +161,7 @@ impl<'a> Component<'a> {
         own: f64,
         workshop: Workshop<'a>,
     ) -> Result<Option<(Self, JoinEvidence)>, MappingError> {
-        let mut both = Self::side_by_side(host, guest, way)?;
+        let mut both = Self::side_by_side(host, guest, way, workshop)?;
         let inside = [host.closures.as_slice(), &guest.closures].concat();
         let mut across = way.closures.clone();
         let mut tried = Vec::new();
@@ -146,14 +191,58 @@ impl<'a> Component<'a> {
         Ok(Some((both, evidence)))
     }
 
-    fn side_by_side(host: &Self, guest: &Self, way: &Way) -> Result<Self, MappingError> {
+    /// A body of the foundation with the runs that were laid over it, each by itself: what they were alone, and what they
+    /// are with the body.
+    ///
+    /// # Errors
+    /// Whatever the graph cannot solve.
+    pub fn founded(
+        body: &Self,
+        guests: &[(Self, Box<Self>)],
+        workshop: Workshop<'a>,
+    ) -> Result<Self, MappingError> {
+        let piece = body.graph.runs()[0];
+        let of_guests = guests.iter().flat_map(|(alone, _)| alone.graph.runs());
+        let runs = body.graph.runs().iter().chain(of_guests).copied().collect();
+        let pose_of = |anchor: AnchorIdx| {
+            let of_it = guests.iter().map(|(_, both)| &both.graph).find(|graph| graph.holds(anchor));
+            of_it.map_or_else(Pose2::identity, |graph| graph.pose_of_body(piece).between(&graph.pose(anchor)))
+        };
+        let graph = CoarseGraph::new(body.graph.site, runs, pose_of, |piece| body.graph.pose_of_body(piece))?;
+        let mut settled = body.own_opinions(workshop);
+        guests.iter().for_each(|(alone, _)| settled += alone.own_opinions(workshop));
+        let mut founded = Self::new(graph, Some(settled));
+        for (_, both) in guests {
+            founded.closures.extend(&both.closures);
+            founded.looked.extend(&both.looked);
+        }
+        founded.graph.optimize(&founded.closures)?;
+        Ok(founded)
+    }
+
+    fn side_by_side(
+        host: &Self,
+        guest: &Self,
+        way: &Way,
+        workshop: Workshop<'a>,
+    ) -> Result<Self, MappingError> {
         let runs = [host.graph.runs(), guest.graph.runs()].concat();
         let pose_of = |anchor: AnchorIdx| match host.graph.holds(anchor) {
             true => host.graph.pose(anchor),
             false => way.host_from_guest.compose(&guest.graph.pose(anchor)),
         };
-        let graph = CoarseGraph::new(host.graph.site, runs, pose_of)?;
-        Ok(Self::new(graph, Looked::default()))
+        let pose_of_body = |piece: RunIdx| match host.graph.runs().binary_search(&piece) {
+            Ok(_) => host.graph.pose_of_body(piece),
+            Err(_) => way.host_from_guest.compose(&guest.graph.pose_of_body(piece)),
+        };
+        let graph = CoarseGraph::new(host.graph.site, runs, pose_of, pose_of_body)?;
+        let holds_body = host.settled.is_some() || guest.settled.is_some();
+        let settled = holds_body.then(|| {
+            let mut opinions = host.own_opinions(workshop);
+            opinions += guest.own_opinions(workshop);
+            opinions
+        });
+        Ok(Self::new(graph, settled))
     }
 }
 

@@ -77,6 +77,8 @@ pub struct MappingConfig {
     pub max_joining_sd_m: f64,
     /// Another way to join the same two maps counts when it fits at this share of the anchors or more.
     pub max_ambiguity: f64,
+    /// Runs of a generation: when it is full its poses stay, and what follows is laid over them.
+    pub generation_runs: usize,
     /// Profile candidates of two runs that are registered, the best first.
     pub max_candidates_per_pair: usize,
     /// Anchors whose registrations must agree before a joined map is tried.
@@ -139,6 +141,7 @@ impl Default for MappingConfig {
             min_joining_share: 0.7,
             max_joining_sd_m: 0.2,
             max_ambiguity: 0.7,
+            generation_runs: 10,
             max_candidates_per_pair: 600,
             min_seeds: 2,
             max_ways: 12,
@@ -164,6 +167,9 @@ impl MappingConfig {
         self.robust.validate(&format!("{path}.robust"))?;
         self.consistency.validate(&format!("{path}.consistency"))?;
         self.changes.validate(&format!("{path}.changes"))?;
+        if self.generation_runs == 0 {
+            return Err(ConfigError::new(format!("{path}.generation_runs"), "must be at least 1"));
+        }
         let positive = [
             ("anchor_spacing_m", self.anchor_spacing_m),
             ("submap_half_length_m", self.submap_half_length_m),

@@ -1,10 +1,10 @@
 //! The finished map as values, told of the runs in the order in which they were given.
 
 use super::claims::{ClosureIndex, refused_match};
-use super::component::Component;
-use super::indices::{AnchorIdx, RunIdx};
+use super::component::{Component, Workshop};
+use super::indices::{AnchorIdx, BodyIdx, RunIdx};
 use super::joining::Joined;
-use super::judgements::Judgements;
+use super::null::Null;
 use super::place_match::PlaceMatch;
 use super::placement::place_observations;
 use super::run::RunRecord;
@@ -12,18 +12,32 @@ use super::site_anchors::SiteAnchors;
 use super::site_map::{MappedRun, SiteMap};
 use super::stretches::{StretchSettings, find_stretches};
 use crate::geometry::Pose2;
+use crate::registration::Opinions;
 
 /// Longest stretch, observations: short ones are proportional enough.
 const MAX_STRETCH: u32 = 25;
 
-/// Places every keyframe, and makes the claims that the map amounts to.
+/// A finished map, with what the next one may be founded upon.
+pub(crate) struct Finished {
+    /// Of pieces and runs, in the order in which they were told.
+    pub map: SiteMap,
+    /// For each body where it lies in the map.
+    pub map_from_bodies: Vec<Pose2>,
+    /// For each component what its places say of each other where closures hold them together, when it will be settled.
+    pub opinions: Vec<Opinions>,
+    /// Wrong ways to lay runs over themselves.
+    pub null: Null,
+}
+
+/// Places every keyframe, and makes the claims that the map amounts to. A map that is full will be settled.
 pub(crate) fn finished(
     joined: Joined<'_>,
-    site: &SiteAnchors<'_>,
-    judgements: &Judgements<'_>,
+    workshop: Workshop<'_>,
     told: &[RunRecord<'_>],
-) -> SiteMap {
-    let Joined { components, refused, unfit } = joined;
+    is_full: bool,
+) -> Finished {
+    let Workshop { site, judgements, .. } = workshop;
+    let Joined { components, refused, unfit, null } = joined;
     let runs = mapped_runs(&components, site, told.len());
     let poses: Vec<Vec<Pose2>> =
         told.iter().zip(&runs).map(|(run, mapped)| place_observations(run, mapped)).collect();
@@ -40,7 +54,9 @@ pub(crate) fn finished(
         found
     };
     let is_registered = |a, b| closures.is_registered(a, b);
-    let matches = find_stretches(told, &poses, &component_of, &is_registered, &settings)
+    let bodies: Vec<Option<BodyIdx>> =
+        (0..told.len()).map(|place| site.run_told(place).and_then(|run| site.body_of(run))).collect();
+    let matches = find_stretches(told, &poses, (&component_of, &bodies), &is_registered, &settings)
         .iter()
         .map(|stretch| settled(closures.spatial_match(stretch, told)))
         .collect();
@@ -48,7 +64,44 @@ pub(crate) fn finished(
     let refused = within.chain(&refused).map(|refusal| settled(refused_match(refusal, site)));
     let refused = refused.chain(unfit).collect();
     let num_components = runs.iter().map(|run| run.component + 1).max().unwrap_or_default();
-    SiteMap { matches, refused, runs, num_components }
+    let mut opinions = vec![Opinions::default(); num_components as usize];
+    for component in components.iter().filter(|_| is_full) {
+        let number = runs[site.told(component.graph.runs()[0])].component;
+        opinions[number as usize] = component.opinions(workshop);
+    }
+    let map_from_bodies = map_from_bodies(&components, site);
+    Finished { map: SiteMap { matches, refused, runs, num_components }, map_from_bodies, opinions, null }
+}
+
+/// For each body where it lies in its component.
+fn map_from_bodies(components: &[Component<'_>], site: &SiteAnchors<'_>) -> Vec<Pose2> {
+    let mut map_from_bodies = Vec::new();
+    for piece in site.runs() {
+        if site.body_of(piece).is_none_or(|body| body.at() != map_from_bodies.len()) {
+            continue;
+        }
+        let is_of_it = |component: &&Component<'_>| component.graph.runs().binary_search(&piece).is_ok();
+        let Some(component) = components.iter().find(is_of_it) else { continue };
+        let map_from_graph = map_from_graph(component, first_told(component));
+        map_from_bodies.push(map_from_graph.compose(&component.graph.pose_of_body(piece)));
+    }
+    map_from_bodies
+}
+
+/// The run of a component that was told first.
+fn first_told(component: &Component<'_>) -> RunIdx {
+    let (runs, site) = (component.graph.runs(), component.graph.site);
+    *runs.iter().min_by_key(|run| site.told(**run)).unwrap_or(&runs[0])
+}
+
+/// The frame of a component is where the run that was told first began, or that of its body if it is a piece.
+fn map_from_graph(component: &Component<'_>, first: RunIdx) -> Pose2 {
+    let site = component.graph.site;
+    if site.body_of(first).is_some() {
+        return component.graph.pose_of_body(first).inverse();
+    }
+    let began = AnchorIdx::new(site.of_run(first).start);
+    site.anchor(began).run_from_anchor.compose(&component.graph.pose(began).inverse())
 }
 
 /// Every run in its component. Components are numbered by the run that was given first, and stand in its frame: what a
@@ -81,10 +134,16 @@ fn mapped_runs(components: &[Component<'_>], site: &SiteAnchors<'_>, num_runs: u
 /// Poses of the keyframes of all runs of a component in the frame of one of them: where that run began.
 fn in_frame_of(component: &Component<'_>, first: RunIdx) -> Vec<(RunIdx, Vec<Pose2>)> {
     let site = component.graph.site;
-    let beginning = site.of_run(first).start;
-    let began = AnchorIdx::new(beginning);
-    let map_from_graph = site.anchor(began).run_from_anchor.compose(&component.graph.pose(began).inverse());
+    let map_from_graph = map_from_graph(component, first);
     let placed = |&run: &RunIdx| {
+        if site.body_of(run).is_some() {
+            let map_from_body = map_from_graph.compose(&component.graph.pose_of_body(run));
+            let keyframes = site.record(run).keyframes.iter();
+            return (
+                run,
+                keyframes.map(|keyframe| map_from_body.compose(&keyframe.run_from_robot)).collect(),
+            );
+        }
         let pose_of = |anchor| map_from_graph.compose(&component.graph.pose(anchor));
         (run, spread_corrections(site, run, pose_of))
     };

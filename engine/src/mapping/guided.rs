@@ -164,11 +164,7 @@ fn find_neighbors(
             near_of.push((later, near));
         }
     }
-    let node = |anchor: AnchorIdx| graph.node(anchor) as u32;
-    let questions: Vec<(u32, Vec<u32>)> = (near_of.iter())
-        .map(|(later, near)| (node(*later), near.iter().map(|&earlier| node(earlier)).collect()))
-        .collect();
-    let relatives = graph.covariances()?.relatives(&questions)?;
+    let relatives = graph.relatives(&near_of)?;
     let mut found = Vec::new();
     for ((later, near), relatives) in near_of.into_iter().zip(relatives) {
         for (earlier, (later_from_earlier, covariance)) in near.into_iter().zip(relatives) {

@@ -4,6 +4,10 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct RunIdx(u32);
 
+/// A part of the foundation that moves as a whole, by its place among those of the foundation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct BodyIdx(u32);
+
 /// A keyframe of a run, by its place along the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct KeyframeIdx(u32);
@@ -19,6 +23,18 @@ impl RunIdx {
     }
 
     /// Its place in a list of all runs.
+    pub const fn at(self) -> usize {
+        self.0 as usize
+    }
+}
+
+impl BodyIdx {
+    /// The body at this place.
+    pub const fn new(place: usize) -> Self {
+        Self(place as u32)
+    }
+
+    /// Its place in a list of all bodies.
     pub const fn at(self) -> usize {
         self.0 as usize
     }

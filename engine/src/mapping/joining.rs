@@ -26,6 +26,8 @@ pub(crate) struct Joined<'a> {
     pub refused: Vec<Refusal>,
     /// Candidates whose submaps do not fit.
     pub unfit: Vec<PlaceMatch>,
+    /// Wrong ways to lay runs over themselves.
+    pub null: Null,
 }
 
 /// Two components that might be joined.
@@ -42,11 +44,13 @@ impl Proposal<'_> {
     }
 }
 
-/// Lays components over each other, the surest first, as long as one convinces.
+/// Lays components over each other, the surest first, as long as one convinces. `bodies` come from the foundation, with
+/// the null of the runs in them.
 ///
 /// # Errors
 /// Whatever the graph cannot solve; [`MappingError::Stopped`].
 pub(crate) fn join<'a>(
+    (bodies, of_bodies): (Vec<Component<'a>>, &Null),
     alone: Vec<Component<'a>>,
     workshop: Workshop<'a>,
 ) -> Result<Joined<'a>, MappingError> {
@@ -57,15 +61,20 @@ pub(crate) fn join<'a>(
         !judgements.forbid(earlier, later) && !judgements.keep_apart(&[run_of(earlier)], &[run_of(later)])
     };
     let candidates: Vec<Candidate> = candidates_across(workshop.site).into_iter().filter(may_be).collect();
-    let null = Null::of(&alone, workshop.part(0, 3))?;
-    let mut joiner = Joiner::new(alone, &candidates, null, workshop);
-    let mut proposals = joiner.proposals(|_, _| true);
+    let null = of_bodies.with(&Null::of(&alone, workshop.part(0, 4))?);
+    let num_bodies = bodies.len();
+    let apart = bodies.into_iter().chain(alone);
+    let mut joiner = Joiner::new(apart, &candidates, null, workshop);
+    joiner.found(num_bodies, workshop.part(1, 4))?;
+    // What was refused stays refused as long as neither of the two has grown.
+    let is_open = |host, guest| !joiner.refusals.contains_key(&(host, guest)) || joiner.grown.contains(&host);
+    let mut proposals = joiner.proposals(is_open);
     let mut num_proposals = proposals.len();
     while let Some(proposal) = proposals.pop() {
         let num_left = proposals.len() + 1;
         num_proposals = num_proposals.max(num_left);
         let (host, guest) = (proposal.host, proposal.guest);
-        let laying = workshop.part(1, 3).part(num_proposals - num_left, num_proposals);
+        let laying = workshop.part(2, 4).part(num_proposals - num_left, num_proposals);
         if !joiner.try_join(&proposal, laying)? {
             continue;
         }
@@ -96,12 +105,12 @@ struct Joiner<'a, 'c> {
 
 impl<'a, 'c> Joiner<'a, 'c> {
     fn new(
-        alone: Vec<Component<'a>>,
+        apart: impl Iterator<Item = Component<'a>>,
         candidates: &'c [Candidate],
         null: Null,
         workshop: Workshop<'a>,
     ) -> Self {
-        let components = alone.into_iter().map(|component| (component.graph.runs()[0], component)).collect();
+        let components = apart.map(|component| (component.graph.runs()[0], component)).collect();
         Self {
             workshop,
             candidates,
@@ -137,18 +146,71 @@ impl<'a, 'c> Joiner<'a, 'c> {
         found
     }
 
-    /// Joins two components if one of the ways to do so holds and no other holds nearly as well; otherwise everything
-    /// stays as it was.
-    fn try_join(&mut self, proposal: &Proposal<'c>, workshop: Workshop<'a>) -> Result<bool, MappingError> {
+    /// Lays every new run over every body of the foundation by itself, and joins those that fit one of them. What comes
+    /// of that does not depend on what else is new, so that the next build need not find it out again. A run that fits
+    /// two bodies joins these, which is for later.
+    fn found(&mut self, num_bodies: usize, workshop: Workshop<'a>) -> Result<(), MappingError> {
+        let firsts: Vec<RunIdx> = self.components.keys().copied().collect();
+        let bodies = &firsts[..num_bodies];
+        let proposals = self.proposals(|host, guest| bodies.contains(&host) && !bodies.contains(&guest));
+        let num_proposals = proposals.len();
+        let judged = (proposals.par_iter().enumerate())
+            .map(|(idx, proposal)| self.judged(proposal, workshop.part(idx, num_proposals)))
+            .collect::<Result<Vec<_>, _>>()?;
+        let mut fitting: BTreeMap<RunIdx, Vec<(RunIdx, Box<Component<'a>>)>> = BTreeMap::new();
+        for (proposal, (registered, verdict)) in proposals.iter().zip(judged) {
+            self.note(registered);
+            match verdict {
+                Verdict::Joined(both) => {
+                    fitting.entry(proposal.guest).or_default().push((proposal.host, both))
+                }
+                Verdict::Apart(reason) => {
+                    self.refusals.insert((proposal.host, proposal.guest), reason);
+                }
+            }
+        }
+        let mut guests: BTreeMap<RunIdx, Vec<(Component<'a>, Box<Component<'a>>)>> = BTreeMap::new();
+        for (guest, mut hosts) in fitting {
+            let (1, Some((host, both))) = (hosts.len(), hosts.pop()) else { continue };
+            let Some(alone) = self.components.remove(&guest) else { continue };
+            self.refusals.retain(|(_, other), _| *other != guest);
+            guests.entry(host).or_default().push((alone, both));
+        }
+        for (host, guests) in guests {
+            let founded = Component::founded(&self.components[&host], &guests, workshop)?;
+            self.components.insert(host, founded);
+            self.grown.push(host);
+        }
+        Ok(())
+    }
+
+    /// What comes of two components, with the registrations that say so.
+    fn judged(
+        &self,
+        proposal: &Proposal<'c>,
+        workshop: Workshop<'a>,
+    ) -> Result<(Registered<'c>, Verdict<'a>), MappingError> {
         let (host, guest) = (&self.components[&proposal.host], &self.components[&proposal.guest]);
         let registered = proposal.groups.ways(workshop.part(0, 2))?;
         let verdict = judged(&registered.ways, host, guest, &self.null, workshop.part(1, 2))?;
+        Ok((registered, verdict))
+    }
+
+    /// Notes registrations for the list of what the map does not bear out.
+    fn note(&mut self, registered: Registered<'c>) {
         let Registered { fits, unfit, .. } = registered;
         self.fits.extend(fits);
         self.unfit.extend(unfit.into_iter().map(|candidate| {
             let place = self.candidates.partition_point(|other| other.key() < candidate.key());
             (place, candidate)
         }));
+    }
+
+    /// Joins two components if one of the ways to do so holds and no other holds nearly as well; otherwise everything
+    /// stays as it was.
+    fn try_join(&mut self, proposal: &Proposal<'c>, workshop: Workshop<'a>) -> Result<bool, MappingError> {
+        let (registered, verdict) = self.judged(proposal, workshop)?;
+        self.note(registered);
         match verdict {
             Verdict::Joined(both) => {
                 self.components.remove(&proposal.guest);
@@ -171,7 +233,7 @@ impl<'a, 'c> Joiner<'a, 'c> {
     fn finish(mut self) -> Result<Joined<'a>, MappingError> {
         for run in &self.grown {
             if let Some(component) = self.components.get_mut(run) {
-                component.settle(self.workshop.part(2, 3))?;
+                component.settle(self.workshop.part(3, 4))?;
             }
         }
         let first_of = |closure: &Closure| {
@@ -195,7 +257,7 @@ impl<'a, 'c> Joiner<'a, 'c> {
         };
         let refused = self.fits.iter().filter_map(refusal).collect();
         let unfit = unfit_matches(self.unfit.values().copied(), self.workshop.site);
-        Ok(Joined { components: self.components.into_values().collect(), refused, unfit })
+        Ok(Joined { components: self.components.into_values().collect(), refused, unfit, null: self.null })
     }
 }
 

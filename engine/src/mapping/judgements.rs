@@ -77,13 +77,18 @@ impl<'a> Judgements<'a> {
 
     /// Settles a match on which a person spoke; the latest word counts.
     pub fn settle(&self, found: &mut PlaceMatch) {
-        let on_it = self.decisions.iter().rev().find(|decision| decision.is_about(found));
-        let Some(decision) = on_it else { return };
-        (found.state, found.probability) = match decision.is_same_place {
-            true => (MatchState::Verified, 1.0),
-            false => (MatchState::Rejected(RejectionReason::Vetoed), 0.0),
-        };
+        settle(self.decisions, found);
     }
+}
+
+/// Settles a match on which a person spoke; the latest word counts.
+pub(crate) fn settle(decisions: &[Decision], found: &mut PlaceMatch) {
+    let on_it = decisions.iter().rev().find(|decision| decision.is_about(found));
+    let Some(decision) = on_it else { return };
+    (found.state, found.probability) = match decision.is_same_place {
+        true => (MatchState::Verified, 1.0),
+        false => (MatchState::Rejected(RejectionReason::Vetoed), 0.0),
+    };
 }
 
 /// Anchors whose submaps reach into an interval; none when the run does not hold it.

@@ -1,23 +1,18 @@
 //! From runs to one map, the conductor.
 
-use rayon::prelude::*;
-
-use super::component::{Component, Workshop};
 use super::config::MappingConfig;
-use super::finish::finished;
-use super::joining::join;
-use super::judgements::Judgements;
+use super::foundation::{Foundation, MapSettings};
 use super::memo::RegistrationMemo;
 use super::place_match::Decision;
 use super::run::RunRecord;
-use super::site_anchors::SiteAnchors;
 use super::site_map::SiteMap;
-use super::watch::{MapStage, MappingError, Watch};
+use super::watch::{MappingError, Watch};
 
-/// Builds the map of a site: every run is settled on its own, then runs are joined, the surest first.
+/// Builds the map of a site from nothing: generation after generation, in the order in which the site lists its runs.
 ///
-/// The map follows from what was recorded, not from the order of `runs`: that only numbers the components, says which
-/// of two runs is called the earlier, and in whose frame a component stands.
+/// Within a generation every run is settled on its own, then runs are joined, the surest first. A generation follows from
+/// what was recorded, not from the order of its runs: that only numbers the components, says which of two runs is called
+/// the earlier, and in whose frame a component stands.
 ///
 /// # Errors
 /// Whatever the pose graph cannot solve.
@@ -42,18 +37,15 @@ pub fn map_site_watched(
     memo: &mut RegistrationMemo,
     watch: Watch<'_>,
 ) -> Result<SiteMap, MappingError> {
-    memo.prepare(&config.submap);
-    let site = SiteAnchors::new(runs, config);
-    if site.driven().is_empty() {
-        return Ok(SiteMap::default());
+    let settings = MapSettings { mapping: config, matching: None };
+    let mut foundation = Foundation::default();
+    let mut generations = runs.chunks(config.generation_runs.max(1));
+    let Some(mut generation) = generations.next() else { return Ok(SiteMap::default()) };
+    for next in generations {
+        let extended = foundation.extended(settings, generation, decisions, memo, watch)?;
+        // All but the last are full.
+        foundation = extended.foundation.unwrap_or(foundation);
+        generation = next;
     }
-    let judgements = Judgements::new(decisions, &site);
-    let workshop =
-        Workshop { site: &site, judgements: &judgements, memo, span: watch.stage(MapStage::Settling) };
-    let driven = site.driven();
-    let alone = (driven.par_iter().enumerate())
-        .map(|(idx, &run)| Component::alone(workshop.part(idx, driven.len()), run))
-        .collect::<Result<Vec<_>, _>>()?;
-    let joined = join(alone, Workshop { span: watch.stage(MapStage::Joining), ..workshop })?;
-    Ok(finished(joined, &site, &judgements, runs))
+    Ok(foundation.extended(settings, generation, decisions, memo, watch)?.map)
 }

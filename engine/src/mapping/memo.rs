@@ -36,16 +36,20 @@ const NUM_OPINIONS_MAX: usize = 500_000;
 #[derive(Debug, Default, Serialize, Deserialize)]
 pub struct RegistrationMemo {
     fits: Mutex<HashMap<Key, Option<SubmapFit>>>,
+    /// Those that were asked for before the last map was finished, and not since.
+    older: HashMap<Key, Option<SubmapFit>>,
     /// What submaps said of each other; cheaper than the submaps, which need not be made again.
     #[serde(skip)]
     opinions: Mutex<HashMap<LaidKey, Opinions>>,
+    #[serde(skip)]
+    older_opinions: HashMap<LaidKey, Opinions>,
     config: Option<SubmapConfig>,
 }
 
 impl RegistrationMemo {
     /// Number of remembered registrations.
     pub fn len(&self) -> usize {
-        self.fits.lock().unwrap_or_else(PoisonError::into_inner).len()
+        self.fits.lock().unwrap_or_else(PoisonError::into_inner).len() + self.older.len()
     }
 
     /// True when nothing is remembered.
@@ -62,8 +66,16 @@ impl RegistrationMemo {
         }
         if is_other {
             self.fits.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
+            self.older.clear();
+            self.older_opinions.clear();
             self.config = Some(config.clone());
         }
+    }
+
+    /// Forgets what was not asked for since the last turn, once a map is finished: what is settled asks no more.
+    pub(crate) fn turn(&mut self) {
+        self.older = std::mem::take(self.fits.get_mut().unwrap_or_else(PoisonError::into_inner));
+        self.older_opinions = std::mem::take(self.opinions.get_mut().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// What two submaps that lie like this say of each other.
@@ -78,6 +90,10 @@ impl RegistrationMemo {
         let key = (name(earlier), name(later), [x, y, theta].map(|value| value.to_bits()));
         let known = |opinions: &HashMap<LaidKey, Opinions>| opinions.get(&key).copied();
         if let Some(known) = known(&self.opinions.lock().unwrap_or_else(PoisonError::into_inner)) {
+            return known;
+        }
+        if let Some(known) = known(&self.older_opinions) {
+            self.opinions.lock().unwrap_or_else(PoisonError::into_inner).insert(key, known);
             return known;
         }
         let opinions = Opinions::of(site.submap(earlier), site.submap(later), earlier_from_later);
@@ -99,7 +115,12 @@ impl RegistrationMemo {
     ) -> Result<Vec<Option<SubmapFit>>, MappingError> {
         let keyed: Vec<(Key, Request)> = requests.iter().map(|request| key_of(request, site)).collect();
         let mut missing: Vec<(Key, Request)> = {
-            let fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut fits = self.fits.lock().unwrap_or_else(PoisonError::into_inner);
+            for (key, _) in &keyed {
+                if let Some(fit) = self.older.get(key) {
+                    fits.entry(*key).or_insert(*fit);
+                }
+            }
             keyed.iter().filter(|(key, _)| !fits.contains_key(key)).copied().collect()
         };
         missing.sort_by_key(|(key, _)| *key);

@@ -5,6 +5,7 @@
 //! them, is what a join between runs must exceed.
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::candidates::candidates_within;
 use super::component::{Component, Workshop};
@@ -21,13 +22,13 @@ use crate::registration::Opinions;
 const NUM_WAYS: usize = 3;
 
 /// The wrong ways to lay the runs of a site over themselves.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Null {
     ways: Vec<WrongWay>,
 }
 
 /// What a wrong way looks like.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct WrongWay {
     /// Anchors that then lie beside others.
     num_beside: usize,
@@ -46,6 +47,23 @@ impl Null {
         };
         let ways = alone.par_iter().enumerate().map(of_run).collect::<Result<Vec<_>, _>>()?;
         Ok(Self { ways: ways.into_iter().flatten().collect() })
+    }
+
+    /// The ways of both, without those that others explain whatever they explain: there are few others.
+    #[must_use]
+    pub fn with(&self, other: &Self) -> Self {
+        let mut all = [self.ways.as_slice(), &other.ways].concat();
+        all.sort_by(|a, b| {
+            let contradicted = a.one_sided_contradiction.total_cmp(&b.one_sided_contradiction);
+            contradicted.then(b.num_beside.cmp(&a.num_beside))
+        });
+        let mut longest = None;
+        all.retain(|way| {
+            let is_longer = longest.is_none_or(|longest| way.num_beside > longest);
+            longest = longest.max(Some(way.num_beside));
+            is_longer
+        });
+        Self { ways: all }
     }
 
     /// True when a wrong way of this building reaches about as far and is contradicted as little.

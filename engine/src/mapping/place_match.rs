@@ -1,5 +1,6 @@
 //! A match: the claim that two stretches of driving went through the same place, with its evidence.
 
+use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose2;
@@ -30,6 +31,23 @@ pub struct Registration {
     pub covariance: [[f64; 3]; 3],
     /// Share of returns and free space, of both submaps, that agree: 1 is perfect.
     pub agreement: f64,
+}
+
+impl Registration {
+    /// The same, with the earlier keyframe seen from the later one.
+    pub(crate) fn seen_from_later(&self) -> Self {
+        let inverse = self.earlier_from_later.inverse();
+        let (sin, cos) = self.earlier_from_later.theta.sin_cos();
+        let by_pose = Matrix3::new(-cos, -sin, inverse.y, sin, -cos, -inverse.x, 0.0, 0.0, -1.0);
+        let covariance = Matrix3::from_fn(|row, column| self.covariance[row][column]);
+        Self {
+            earlier_keyframe: self.later_keyframe,
+            later_keyframe: self.earlier_keyframe,
+            earlier_from_later: inverse,
+            covariance: (by_pose * covariance * by_pose.transpose()).transpose().into(),
+            agreement: self.agreement,
+        }
+    }
 }
 
 /// Everything known for or against a match.

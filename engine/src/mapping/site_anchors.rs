@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 use rayon::prelude::*;
 
 use super::config::MappingConfig;
-use super::indices::{AnchorIdx, KeyframeIdx, RunIdx};
+use super::indices::{AnchorIdx, BodyIdx, KeyframeIdx, RunIdx};
 use super::run::{Keyframe, RunRecord};
 use crate::geometry::Pose2;
 use crate::registration::{Submap, SubmapScan};
@@ -32,11 +32,15 @@ pub(crate) struct Anchor {
 ///
 /// What the map builder decides between two runs may depend on which comes first, by a rounding at least. So runs are
 /// ordered by what they recorded, and whoever makes the same recordings in another order gets the same map.
+///
+/// Pieces of the foundation count as runs here and come before all others. The frame of a piece is that of its body.
 pub(crate) struct SiteAnchors<'a> {
     pub config: &'a MappingConfig,
     runs: Vec<RunRecord<'a>>,
     /// For each run its place in the list that the map builder was given.
     told: Vec<usize>,
+    /// For each run the body of which it is a piece, if it is one.
+    bodies: Vec<Option<BodyIdx>>,
     anchors: Vec<Anchor>,
     /// Covariance of the refined odometry from each anchor to the next of its run.
     steps: Vec<Matrix3<f64>>,
@@ -49,10 +53,17 @@ pub(crate) struct SiteAnchors<'a> {
 }
 
 impl<'a> SiteAnchors<'a> {
-    /// Orders the runs and chooses their anchors.
-    pub fn new(given: &[RunRecord<'a>], config: &'a MappingConfig) -> Self {
-        let told = order_of(given);
-        let runs: Vec<RunRecord<'a>> = told.iter().map(|&place| given[place]).collect();
+    /// Orders the runs and chooses their anchors; `pieces` are those of each body, and are told before the others.
+    pub fn new(pieces: &[Vec<RunRecord<'a>>], given: &[RunRecord<'a>], config: &'a MappingConfig) -> Self {
+        let of_body =
+            |(body, pieces): (usize, &Vec<RunRecord<'a>>)| vec![Some(BodyIdx::new(body)); pieces.len()];
+        let mut bodies: Vec<Option<BodyIdx>> = pieces.iter().enumerate().flat_map(of_body).collect();
+        let num_pieces = bodies.len();
+        bodies.resize(num_pieces + given.len(), None);
+        let mut runs: Vec<RunRecord<'a>> = pieces.iter().flatten().copied().collect();
+        let order = order_of(given);
+        runs.extend(order.iter().map(|&place| given[place]));
+        let told = (0..num_pieces).chain(order.iter().map(|place| num_pieces + place)).collect();
         let travels_m: Vec<Vec<f64>> = runs.iter().map(|run| travel_of(run.keyframes)).collect();
         let mut chosen = Vec::new();
         let mut starts = vec![0];
@@ -82,7 +93,7 @@ impl<'a> SiteAnchors<'a> {
         let anchors: Vec<Anchor> = chosen.par_iter().map(anchor).collect();
         let steps = (0..anchors.len()).map(|from| step_covariance(&anchors, from, &runs, config)).collect();
         let submaps = anchors.iter().map(|_| OnceLock::new()).collect();
-        Self { config, runs, told, anchors, steps, submaps, starts, travels_m }
+        Self { config, runs, told, bodies, anchors, steps, submaps, starts, travels_m }
     }
 
     /// All runs.
@@ -90,9 +101,24 @@ impl<'a> SiteAnchors<'a> {
         (0..self.runs.len()).map(RunIdx::new)
     }
 
-    /// The runs that moved far enough to be placed.
+    /// The runs that moved far enough to be placed, apart from the foundation.
     pub fn driven(&self) -> Vec<RunIdx> {
-        self.runs().filter(|&run| !self.of_run(run).is_empty()).collect()
+        self.runs().filter(|&run| self.body_of(run).is_none() && !self.of_run(run).is_empty()).collect()
+    }
+
+    /// The body of the foundation of which a run is a piece, if it is one.
+    pub fn body_of(&self, run: RunIdx) -> Option<BodyIdx> {
+        self.bodies[run.at()]
+    }
+
+    /// Pieces of a body, ascending.
+    pub fn pieces_of(&self, body: BodyIdx) -> Vec<RunIdx> {
+        self.runs().filter(|&run| self.body_of(run) == Some(body)).collect()
+    }
+
+    /// True when where two runs lie to each other is settled: they are pieces of one body.
+    pub fn are_settled(&self, a: RunIdx, b: RunIdx) -> bool {
+        self.body_of(a).is_some() && self.body_of(a) == self.body_of(b)
     }
 
     /// What was recorded in a run.
@@ -192,6 +218,9 @@ impl<'a> SiteAnchors<'a> {
     /// True when two anchors may be matched: other runs, or far enough apart along the travel.
     pub fn may_match(&self, a: AnchorIdx, b: AnchorIdx) -> bool {
         let (a, b) = (self.anchor(a), self.anchor(b));
+        if self.are_settled(a.run, b.run) {
+            return false;
+        }
         a.run != b.run || (a.travel_m - b.travel_m).abs() >= self.config.min_gap_m
     }
 

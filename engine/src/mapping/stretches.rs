@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::f64::consts::{FRAC_PI_4, PI};
 
+use super::indices::BodyIdx;
 use super::run::RunRecord;
 use crate::geometry::{Pose2, angle_between};
 use crate::matching::claimed_between;
@@ -55,13 +56,14 @@ type Cells = BTreeMap<(u32, i32, i32), Vec<Place>>;
 
 /// All stretches, in order of the later one.
 ///
-/// `poses` holds for each run the poses of its observations, `components` the frame in which they are given. Of many
+/// `poses` holds for each run the poses of its observations, `components` the frame in which they are given, `bodies` the
+/// body of the foundation that it is a piece of: what two pieces of one body share was found before. Of many
 /// passes beside a visit those come first that were registered with it, then those that lie nearest: a place that was
 /// driven a thousand times is worth no more matches than one that was driven twice.
 pub(crate) fn find_stretches(
     runs: &[RunRecord<'_>],
     poses: &[Vec<Pose2>],
-    components: &[u32],
+    (components, bodies): (&[u32], &[Option<BodyIdx>]),
     is_registered: &impl Fn(Place, Place) -> bool,
     settings: &StretchSettings,
 ) -> Vec<Stretch> {
@@ -86,6 +88,9 @@ pub(crate) fn find_stretches(
                     let cell = (components[run_idx], cell_of(pose.x) + dx, cell_of(pose.y) + dy);
                     near.extend(cells.get(&cell).into_iter().flatten().copied());
                 }
+            }
+            if bodies[run_idx].is_some() {
+                near.retain(|&(other, _)| bodies[other as usize] != bodies[run_idx]);
             }
             near.sort_unstable();
             let mut links = closest_of_each_pass(pose, &near, poses, settings);
@@ -260,7 +265,13 @@ mod tests {
         let records: Vec<RunRecord<'_>> = driven.iter().map(|run| record(run)).collect();
         // What the first run and the last saw of each other was registered.
         let is_registered = |earlier: Place, _| earlier.0 == 0;
-        find_stretches(&records, runs, &vec![0; runs.len()], &is_registered, &SETTINGS)
+        find_stretches(
+            &records,
+            runs,
+            (&vec![0; runs.len()], &vec![None; runs.len()]),
+            &is_registered,
+            &SETTINGS,
+        )
     }
 
     #[test]

@@ -19,7 +19,7 @@ use crate::matching::{
 use crate::text::{Direction, Interval};
 
 /// Claims of the text that are listed beside the map's own, the most surprising first.
-const NUM_CLAIMS_MAX: usize = 200;
+pub(crate) const NUM_CLAIMS_MAX: usize = 200;
 /// Driven shapes that differ by more are not the same place, metres.
 const SHAPE_RESIDUAL_MAX_M: f64 = 1.0;
 /// Density profiles that correlate less are not the same place.
@@ -31,13 +31,23 @@ const APART_MIN_M: f64 = 3.0;
 ///
 /// Runs, map and texts must belong together.
 pub fn weigh_texts(runs: &[RunRecord<'_>], map: &mut SiteMap, config: &MatchingConfig) {
+    weigh_new_texts(runs, 0, map, config);
+}
+
+/// As [`weigh_texts`], where what the first `num_known` runs say of each other was weighed before.
+pub(crate) fn weigh_new_texts(
+    runs: &[RunRecord<'_>],
+    num_known: usize,
+    map: &mut SiteMap,
+    config: &MatchingConfig,
+) {
     let texts: Vec<Lattice> =
         runs.iter().map(|run| Lattice::from_words(run.words).unwrap_or_default()).collect();
     let max_level = config.min_chain_words.len().saturating_sub(1);
     let statistics = TextStatistics::new(&texts, max_level, config.tolerance);
     let all = MatchingConfig { max_chance_matches: f64::INFINITY, ..config.clone() };
     let mut chains: Vec<RunMatch> =
-        (0..runs.len()).flat_map(|run| match_run(&texts, run, &statistics, &all)).collect();
+        (num_known..runs.len()).flat_map(|run| match_run(&texts, run, &statistics, &all)).collect();
     chains.sort_by(surprise);
     let site = Site { runs, texts: &texts, statistics: &statistics, tolerance: config.tolerance };
     let index = index_of(&chains);

@@ -60,18 +60,27 @@ impl Example {
     ) -> Result<Option<Self>, ConfigError> {
         let scans = last_meters(scans, config.length_max_m);
         let mut translator = Translator::new(translator, geometry.clone())?;
-        let mut observations = Vec::new();
+        let mut observations: Vec<Observation> = Vec::new();
         let mut keyframes: Vec<Keyframe> = Vec::new();
         let (mut travel_m, mut run_from_robot) = (0.0, Pose2::identity());
         for (scan_idx, scan) in scans.iter().enumerate() {
             let read = translator.push(scan);
             run_from_robot = read.run_from_robot;
+            if let Some(cut) = read.cut {
+                // Only what was driven since is one place.
+                keyframes.clear();
+                observations.clear();
+                travel_m = 0.0;
+                observations
+                    .extend(read.observations.into_iter().filter(|seen| seen.scan_seq >= cut.scan_seq));
+            } else {
+                observations.extend(read.observations);
+            }
             if read.keyframe.is_some() {
                 travel_m +=
                     keyframes.last().map_or(0.0, |last| last.run_from_robot.distance(&run_from_robot));
                 keyframes.push(Keyframe { scan: scan_idx, run_from_robot, travel_m });
             }
-            observations.extend(read.observations);
         }
         observations.extend(translator.finish().observations);
         let middle = keyframes.partition_point(|keyframe| keyframe.travel_m < 0.5 * travel_m);

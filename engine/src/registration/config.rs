@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config_error::ConfigError;
 use crate::geometry::Pose2;
+use crate::scan::ScanGeometry;
 
 /// Settings of [`Submap`](super::Submap) and [`register`](super::register).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -177,6 +178,9 @@ impl MotionLimits {
     }
 }
 
+/// Fewer returns than this fit anywhere.
+const NUM_POINTS_MIN: usize = 5;
+
 /// Points of the refiner's window are kept with 16 bits a coordinate, 2 mm each.
 const RANGE_LIMIT_MAX_M: f64 = 65.0;
 
@@ -198,7 +202,7 @@ pub struct RefinerConfig {
     pub point_spacing_m: f64,
     /// At most this many returns of a scan are used.
     pub max_points: usize,
-    /// Fewer returns than this are not registered.
+    /// Fewer returns than this are not registered; of a laser with few beams it is half of them.
     pub min_points: usize,
     /// Edge of a surface cell, metres.
     pub cell_m: f64,
@@ -244,6 +248,13 @@ pub struct RefinerConfig {
     pub lie_probability: f64,
     /// Probability that it stops to.
     pub recovery_probability: f64,
+    /// A run is cut when so many scans in a row leave the robot's place in doubt.
+    pub num_doubtful_scans: u32,
+    /// A fit with this share of returns on surfaces leaves no doubt.
+    pub sure_inlier_share: f64,
+    /// A lesser one does, whatever odometry says, when it sees through a larger share of what the scans before saw near
+    /// by.
+    pub max_seen_through: f64,
 }
 
 impl Default for RefinerConfig {
@@ -279,6 +290,9 @@ impl Default for RefinerConfig {
             sound_chi2: 12.0,
             lie_probability: 0.001,
             recovery_probability: 0.1,
+            num_doubtful_scans: 3,
+            sure_inlier_share: 0.5,
+            max_seen_through: 0.08,
         }
     }
 }
@@ -312,6 +326,11 @@ impl SubmapConfig {
 }
 
 impl RefinerConfig {
+    /// Returns that a scan of this laser must have to be registered.
+    pub(super) fn min_points_of(&self, geometry: &ScanGeometry) -> usize {
+        self.min_points.min((geometry.num_ranges / 2).max(NUM_POINTS_MIN))
+    }
+
     /// Checks every value; `path` is this struct's own path.
     ///
     /// # Errors
@@ -351,6 +370,12 @@ impl RefinerConfig {
         }
         if self.num_check_points == 0 {
             return Err(ConfigError::new(format!("{path}.num_check_points"), "must be positive"));
+        }
+        if self.num_doubtful_scans == 0 {
+            return Err(ConfigError::new(format!("{path}.num_doubtful_scans"), "must be positive"));
+        }
+        if !(0.0..=1.0).contains(&self.max_seen_through) {
+            return Err(ConfigError::new(format!("{path}.max_seen_through"), "must lie between 0 and 1"));
         }
         if self.range_limit_m > RANGE_LIMIT_MAX_M {
             let problem = format!("must be at most {RANGE_LIMIT_MAX_M}");

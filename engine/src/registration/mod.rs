@@ -9,6 +9,7 @@ mod branch_and_bound;
 mod config;
 mod correlative;
 mod evidence_grid;
+mod lost;
 mod motion_prior;
 mod odometry_record;
 mod point_to_line;
@@ -18,6 +19,7 @@ mod refiner;
 #[cfg(test)]
 mod refiner_tests;
 mod register;
+mod scan_clock;
 mod submap;
 mod surface_map;
 #[cfg(test)]
@@ -26,8 +28,10 @@ pub(crate) mod testing;
 pub use area::{Area, AreaBuilder, AreaFit, AreaSearch};
 pub use branch_and_bound::SearchWindow;
 pub use config::{MotionLimits, OdometryNoise, RefinerConfig, SubmapConfig};
+pub use lost::CutReason;
 pub(crate) use refiner::rotated;
 pub use refiner::{KeyframeMotion, OdometryRefiner, Refined};
 pub(crate) use register::Opinions;
 pub use register::{SubmapFit, refine_from, register};
+pub(crate) use scan_clock::ScanClock;
 pub use submap::{Submap, SubmapScan};

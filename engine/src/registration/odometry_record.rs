@@ -52,6 +52,11 @@ impl OdometryRecord {
         (1.0 - self.doubt).min(ceiling)
     }
 
+    /// True when a step says nothing because there is no odometry, or none any more.
+    pub fn is_mute(&self, step: &Pose2) -> bool {
+        *step == Pose2::identity() && (self.mute_m > MUTE_M || !self.has_moved)
+    }
+
     /// Takes note of a step of the odometry and of what was found instead.
     pub fn witness(&mut self, step: &Pose2, found: &Pose2) {
         if *step == Pose2::identity() {

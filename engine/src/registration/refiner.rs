@@ -7,22 +7,43 @@ use serde::{Deserialize, Serialize};
 
 use super::config::RefinerConfig;
 use super::correlative::{LikelihoodGrid, LocalWindow};
-use super::motion_prior::{MotionPrior, Witness};
+use super::lost::{CutReason, Doubt};
 use super::odometry_record::OdometryRecord;
 use super::point_to_line::{Alignment, AlignmentSettings, align, linearize};
 use super::points::thinned_points;
 use super::recent_scan::RecentScan;
+use super::scan_clock::ScanClock;
 use super::surface_map::{FittedSurfaces, SurfaceMap};
 use crate::geometry::{Point2, Pose2};
 use crate::scan::{Scan, ScanGeometry};
 
+mod doubt;
+mod expectation;
+
+use expectation::Expectation;
+
 /// What the refiner says of one scan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
-    /// Pose in the run's own frame, which starts at the first odometry pose.
+    /// Pose in the run's own frame, which starts at the first odometry pose; after a cut in another one, which starts
+    /// at the odometry pose there.
     pub run_from_robot: Pose2,
     /// Present when the scan was registered: keep it as a keyframe.
     pub keyframe: Option<KeyframeMotion>,
+    /// Present when nothing tells how the robot came here from where the scans before were taken.
+    pub cut: Option<CutReason>,
+    /// True when the pose is a guess: the scan fits nothing, and the next ones will tell.
+    pub is_doubtful: bool,
+}
+
+/// What became of a scan.
+enum Advance {
+    /// The robot is here, counted from the start; with the motion if the scan makes a keyframe.
+    To(Pose2, Option<KeyframeMotion>),
+    /// The robot may be here.
+    Perhaps(Pose2),
+    /// Everything begins anew.
+    Anew(Option<CutReason>),
 }
 
 /// The motion that led to a keyframe.
@@ -31,9 +52,6 @@ pub struct KeyframeMotion {
     /// Covariance of the motion since the previous keyframe, (x, y, θ) in that keyframe's axes, row by row.
     pub motion_covariance: [[f64; 3]; 3],
 }
-
-/// Time between scans of a robot without a clock, seconds.
-const UNTOLD_INTERVAL_S: f64 = 0.3;
 
 /// Points that a surface must rest on.
 const MIN_COUNT: i32 = 3;
@@ -72,8 +90,11 @@ struct RefinerState {
     /// The latest registered scan, be it a keyframe or not.
     fixed: Option<Fixed>,
     record: OdometryRecord,
-    /// Usual time between scans, seconds; 0 while unknown.
-    interval_s: f64,
+    clock: ScanClock,
+    /// Set while it is doubted that the robot is where it is thought to be.
+    doubt: Option<Doubt>,
+    /// Scans in a row up to the latest that saw next to nothing.
+    num_blind: u32,
     /// Share of returns on surfaces that fits usually have.
     usual_share: f64,
     travel_mm: u64,
@@ -107,25 +128,14 @@ impl From<OdometryRefiner> for RefinerState {
     }
 }
 
-/// What is expected of a scan before it is registered.
-struct Expectation {
-    /// The likeliest pose.
-    predicted: Pose2,
-    prior: MotionPrior,
-    /// What odometry says, with its covariance, when the robot could have moved so.
-    odometry: Option<Witness>,
-    /// True when odometry is what is believed.
-    is_by_odometry: bool,
-    /// How odometry moved from the scan before.
-    step: Pose2,
-}
-
 /// A pose found for a scan.
 struct Settled {
     start_from_robot: Pose2,
     /// Information of (x, y, θ), in the axes of the start.
     information: Matrix3<f64>,
     is_registered: bool,
+    /// Share of the returns that lie on surfaces.
+    inlier_share: f64,
 }
 
 impl OdometryRefiner {
@@ -138,7 +148,9 @@ impl OdometryRefiner {
             keyframe: None,
             fixed: None,
             record: OdometryRecord::default(),
-            interval_s: 0.0,
+            clock: ScanClock::default(),
+            doubt: None,
+            num_blind: 0,
             usual_share: 0.0,
             travel_mm: 0,
             recent: VecDeque::new(),
@@ -150,19 +162,28 @@ impl OdometryRefiner {
     ///
     /// As long as a few returns bear out what odometry says, a scan between keyframes is the latest registered one
     /// composed with odometry. Otherwise it is registered, and odometry counts for no more than one witness. A scan
-    /// that fits the recent scans badly keeps what was expected, with a covariance that says so.
+    /// that fits the recent scans badly keeps what was expected, with a covariance that says so; when that cannot be
+    /// either, and some more scans say the same, the run is cut.
     pub fn refine(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Refined {
-        let (start_from_robot, keyframe) = self.advance(geometry, scan);
-        Refined { run_from_robot: self.state.run_from_start.compose(&start_from_robot), keyframe }
+        let (start_from_robot, keyframe, cut, is_doubtful) = match self.advance(geometry, scan) {
+            Advance::To(pose, keyframe) => (pose, keyframe, None, false),
+            Advance::Perhaps(pose) => (pose, None, None, true),
+            Advance::Anew(cut) => {
+                self.start(geometry, scan);
+                let keyframe = KeyframeMotion { motion_covariance: [[0.0; 3]; 3] };
+                (Pose2::identity(), Some(keyframe), cut, false)
+            }
+        };
+        let run_from_robot = self.state.run_from_start.compose(&start_from_robot);
+        Refined { run_from_robot, keyframe, cut, is_doubtful }
     }
 
-    /// Pose of the next scan from where the run began, and the motion if it makes a keyframe.
-    fn advance(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<KeyframeMotion>) {
-        let Some(latest) = self.state.latest else { return self.start(geometry, scan) };
-        let gap_s = self.clock(scan.timestamp_ns, latest.timestamp_ns);
+    fn advance(&mut self, geometry: &ScanGeometry, scan: &Scan) -> Advance {
+        let Some(latest) = self.state.latest else { return Advance::Anew(None) };
+        let gap_s = self.state.clock.gap_s(scan.timestamp_ns, latest.timestamp_ns);
         let expected = self.expect(&latest, scan, gap_s);
         let (Some(expected), Some(keyframe)) = (expected, self.state.keyframe) else {
-            return self.start(geometry, scan);
+            return Advance::Anew(None);
         };
         let config = &self.state.config;
         let is_due = |pose: &Pose2| {
@@ -171,12 +192,26 @@ impl OdometryRefiner {
                 || moved.theta.abs() >= config.keyframe_turn_rad
         };
         let was_due = is_due(&expected.predicted);
-        if expected.is_by_odometry && !was_due && self.bears_out(geometry, scan, &expected) {
+        if expected.is_by_odometry
+            && !was_due
+            && self.state.doubt.is_none()
+            && self.bears_out(geometry, scan, &expected)
+        {
             self.note(&latest, scan, &expected.step, expected.predicted);
-            return (expected.predicted, None);
+            return Advance::To(expected.predicted, None);
         }
         let points = self.points_of(geometry, scan);
-        let settled = self.settle(&points, &expected, &latest);
+        let min_points = self.state.config.min_points_of(geometry);
+        let settled = self.settle(min_points, &points, &expected, &latest);
+        if let Some(doubt) = self.doubt(geometry, scan, points.len(), &settled, &expected) {
+            if doubt.num_scans >= self.state.config.num_doubtful_scans {
+                return Advance::Anew(Some(doubt.reason));
+            }
+            self.state.doubt = Some(doubt);
+            self.note(&latest, scan, &expected.step, settled.start_from_robot);
+            return Advance::Perhaps(settled.start_from_robot);
+        }
+        self.state.doubt = None;
         let config = &self.state.config;
         let moved = keyframe.start_from_robot.between(&settled.start_from_robot);
         let is_keyframe = was_due
@@ -192,18 +227,22 @@ impl OdometryRefiner {
                     told: Pose2::identity(),
                 });
             }
-            return (settled.start_from_robot, None);
+            return Advance::To(settled.start_from_robot, None);
         }
         self.learn(&keyframe, &settled, &expected);
         self.state.travel_mm += (moved.x.hypot(moved.y) * 1000.0).round() as u64;
         self.keep(&points, settled.start_from_robot);
         let in_keyframe = rotated(&covariance, -keyframe.start_from_robot.theta);
         let motion = KeyframeMotion { motion_covariance: in_keyframe.transpose().into() };
-        (settled.start_from_robot, Some(motion))
+        Advance::To(settled.start_from_robot, Some(motion))
     }
 
-    fn start(&mut self, geometry: &ScanGeometry, scan: &Scan) -> (Pose2, Option<KeyframeMotion>) {
+    /// Begins at a scan; what was learned of odometry and clock stays.
+    fn start(&mut self, geometry: &ScanGeometry, scan: &Scan) {
         let points = self.points_of(geometry, scan);
+        self.state.recent.clear();
+        self.surfaces = SurfaceMap::new(self.state.config.cell_m);
+        (self.state.doubt, self.state.num_blind) = (None, 0);
         self.state.run_from_start = scan.odom_from_robot;
         self.keep(&points, Pose2::identity());
         self.state.latest = Some(Latest {
@@ -213,58 +252,6 @@ impl OdometryRefiner {
             motion: Pose2::identity(),
             angular_velocity_rad_per_s: scan.angular_velocity_rad_per_s,
         });
-        (Pose2::identity(), Some(KeyframeMotion { motion_covariance: [[0.0; 3]; 3] }))
-    }
-
-    /// Seconds since the scan before, as far as the clock can be believed; learns what is usual.
-    fn clock(&mut self, timestamp_ns: i64, before_ns: i64) -> f64 {
-        let gap_s = timestamp_ns.saturating_sub(before_ns) as f64 * 1e-9;
-        let usual_s = &mut self.state.interval_s;
-        if *usual_s <= 0.0 {
-            *usual_s = gap_s.clamp(0.0, 1.0);
-        } else {
-            *usual_s += 0.05 * (gap_s.clamp(0.0, 3.0 * *usual_s) - *usual_s);
-        }
-        // Clocks jitter: only a gap well beyond what is usual counts as one.
-        match *usual_s {
-            usual_s if usual_s <= 0.0 => UNTOLD_INTERVAL_S,
-            usual_s if gap_s > 3.0 * usual_s => gap_s,
-            usual_s => usual_s,
-        }
-    }
-
-    fn expect(&mut self, latest: &Latest, scan: &Scan, gap_s: f64) -> Option<Expectation> {
-        let interval_s = self.state.interval_s;
-        let config = &self.state.config;
-        let step = latest.odom_from_robot.between(&scan.odom_from_robot);
-        let is_possible = config.motion.is_possible(&step, gap_s, interval_s);
-        let share = if interval_s > 0.0 { (gap_s / interval_s).min(10.0) } else { 1.0 };
-        let mut onward =
-            Pose2::new(latest.motion.x * share, latest.motion.y * share, latest.motion.theta * share);
-        let gyroscope = turn_by_gyroscope(latest, scan, gap_s);
-        onward.theta = gyroscope.unwrap_or(onward.theta);
-        // A step that cannot be is offered once, and never carried on.
-        let carried = if is_possible { step } else { onward };
-        let (fixed, keyframe) = (self.state.fixed.as_mut()?, self.state.keyframe.as_mut()?);
-        let told = fixed.told.compose(&step);
-        (fixed.told, keyframe.told) = (fixed.told.compose(&carried), keyframe.told.compose(&carried));
-        let fixed = *fixed;
-        let motion = self.state.record.corrected(&told);
-        let by_odometry = fixed.start_from_robot.compose(&motion);
-        let belief = if is_possible { self.state.record.belief(&step) } else { 0.05 };
-        let covariance =
-            fixed.covariance + rotated(&config.odometry.covariance(&motion), fixed.start_from_robot.theta);
-        let odometry = Witness::new(by_odometry, &covariance, belief);
-        let going_on = latest.start_from_robot.compose(&onward);
-        let covariance = fixed.covariance
-            + rotated(&config.motion.covariance(gap_s, gyroscope.is_some()), latest.start_from_robot.theta);
-        let onward = Witness::new(going_on, &covariance, (1.0 - belief).max(config.lie_probability));
-        let is_by_odometry = odometry.is_some() && belief > 0.5;
-        let predicted = if is_by_odometry { by_odometry } else { going_on };
-        let first = odometry.or(onward).unwrap_or_else(|| Witness::certain(predicted));
-        let prior = MotionPrior::new(first, onward.filter(|_| odometry.is_some()));
-        let odometry = odometry.filter(|_| is_possible);
-        Some(Expectation { predicted, prior, odometry, is_by_odometry, step })
     }
 
     /// True when a few returns of a scan lie as they would if odometry were right.
@@ -276,7 +263,8 @@ impl OdometryRefiner {
             .endpoints_of_every(stride, &scan.ranges_m, config.range_limit_m)
             .map(|(_, point)| point)
             .collect();
-        if points.len() < config.num_check_points / 4 {
+        if points.len() < config.min_points_of(geometry).min(config.num_check_points / 4) {
+            self.state.num_blind += 1;
             return true;
         }
         let settings = alignment_settings(config);
@@ -291,7 +279,11 @@ impl OdometryRefiner {
         let share = f64::from(fit.num_inliers) / points.len() as f64;
         let step = (fit.hessian + odometry.information).try_inverse();
         let gain = step.map_or(0.0, |inverse| (fit.gradient.transpose() * inverse * fit.gradient)[0]);
-        gain < config.check_chi2 && share > config.check_share * self.state.usual_share
+        let is_right = gain < config.check_chi2 && share > config.check_share * self.state.usual_share;
+        if is_right {
+            self.state.num_blind = 0;
+        }
+        is_right
     }
 
     fn points_of(&self, geometry: &ScanGeometry, scan: &Scan) -> Vec<Point2> {
@@ -306,10 +298,21 @@ impl OdometryRefiner {
     }
 
     /// The pose of a scan, and what is then thought of the odometry.
-    fn settle(&mut self, points: &[Point2], expected: &Expectation, latest: &Latest) -> Settled {
-        let Some(found) = self.register(points, expected, latest) else {
-            let (information, _) = expected.prior.pull(&expected.predicted);
-            return Settled { start_from_robot: expected.predicted, information, is_registered: false };
+    fn settle(
+        &mut self,
+        min_points: usize,
+        points: &[Point2],
+        expected: &Expectation,
+        latest: &Latest,
+    ) -> Settled {
+        let Some(found) = self.register(min_points, points, expected, latest) else {
+            let (information, _) = expected.prior.pull(&expected.untold);
+            return Settled {
+                start_from_robot: expected.untold,
+                information,
+                is_registered: false,
+                inlier_share: 0.0,
+            };
         };
         let config = &self.state.config;
         if expected.odometry.is_some() {
@@ -323,12 +326,19 @@ impl OdometryRefiner {
             start_from_robot: found.map_from_points,
             information: found.information,
             is_registered: true,
+            inlier_share: found.inlier_share,
         }
     }
 
     /// The best of the alignments from all the places where the robot may be; none when the fit is poor.
-    fn register(&mut self, points: &[Point2], expected: &Expectation, latest: &Latest) -> Option<Alignment> {
-        if points.len() < self.state.config.min_points {
+    fn register(
+        &mut self,
+        min_points: usize,
+        points: &[Point2],
+        expected: &Expectation,
+        latest: &Latest,
+    ) -> Option<Alignment> {
+        if points.len() < min_points {
             return None;
         }
         let mut best = self.align_from(&expected.predicted, points, expected);
@@ -437,14 +447,6 @@ impl OdometryRefiner {
         }
         self.fitted.clear();
     }
-}
-
-/// How far the robot turned since the scan before by the rates that its gyroscope told at both.
-fn turn_by_gyroscope(latest: &Latest, scan: &Scan, gap_s: f64) -> Option<f64> {
-    let (before, now) = (latest.angular_velocity_rad_per_s?, scan.angular_velocity_rad_per_s?);
-    let turn = 0.5 * (before + now) * gap_s;
-    // Beyond a turn something else than the robot is told of.
-    (turn.abs() < std::f64::consts::TAU).then_some(turn)
 }
 
 fn alignment_settings(config: &RefinerConfig) -> AlignmentSettings {

@@ -1,6 +1,7 @@
 //! The refiner on a simulated drive through offices.
 
 use super::config::RefinerConfig;
+use super::lost::CutReason;
 use super::refiner::OdometryRefiner;
 use super::testing::{Wall, drifting, drive, laser, polygon, sense};
 use crate::geometry::Pose2;
@@ -142,4 +143,101 @@ fn without_returns_odometry_stands() {
         let refined = refiner.refine(&laser(), scan);
         assert!(refined.run_from_robot.distance(&scan.odom_from_robot) < 1e-9);
     }
+}
+
+/// A narrow place elsewhere.
+fn store() -> Vec<Wall> {
+    let mut walls = polygon(&[(50.0, 0.0), (52.2, 0.0), (52.2, 4.0), (54.0, 4.0), (54.0, 9.0), (50.0, 9.0)]);
+    walls.extend(polygon(&[(50.8, 6.0), (51.1, 6.0), (51.1, 6.4), (50.8, 6.4)]));
+    walls
+}
+
+/// A robot that drives through offices and is then carried to where it drives on, five scans a second: what its
+/// odometry says of the carrying follows from where it was; with the number of the first scan behind.
+fn carried(odometry: impl Fn(&Pose2) -> Pose2) -> (Vec<Pose2>, Vec<Scan>, usize) {
+    let (truth, scans) = recording();
+    let from = scans.len() / 4;
+    let there = drive(&[(51.0, 1.0), (51.2, 5.0), (52.6, 8.0)], 0.1);
+    let told = odometry(&scans[from - 1].odom_from_robot);
+    let behind = there.iter().map(|at| {
+        let odom_from_robot = told.compose(&there[0].between(at));
+        sense(&store(), &laser(), at, &odom_from_robot)
+    });
+    let mut scans: Vec<Scan> = scans[..from].iter().cloned().chain(behind).collect();
+    (scans.iter_mut().zip(0..)).for_each(|(scan, idx)| scan.timestamp_ns = idx * 200_000_000);
+    ([&truth[..from], &there].concat(), scans, from)
+}
+
+/// The places of cuts, and how far the poses go wrong between them, metres.
+fn pieces(truth: &[Pose2], scans: &[Scan]) -> (Vec<(usize, CutReason)>, f64) {
+    let mut refiner = OdometryRefiner::new(&RefinerConfig::default());
+    let (mut cuts, mut worst_m, mut first) = (Vec::new(), 0.0f64, 0);
+    let mut refined: Vec<Pose2> = Vec::new();
+    for (idx, scan) in scans.iter().enumerate() {
+        let found = refiner.refine(&laser(), scan);
+        if let Some(reason) = found.cut {
+            cuts.push((idx, reason));
+            first = idx;
+        }
+        refined.push(found.run_from_robot);
+        if !found.is_doubtful {
+            let error = truth[first].between(&truth[idx]).between(&refined[first].between(&refined[idx]));
+            worst_m = worst_m.max(error.x.hypot(error.y));
+        }
+    }
+    (cuts, worst_m)
+}
+
+#[test]
+fn a_robot_that_is_carried_is_in_two_pieces() {
+    let (truth, scans, at) = carried(|before| *before);
+    let (cuts, worst_m) = pieces(&truth, &scans);
+    assert_eq!(cuts.len(), 1, "{cuts:?}");
+    assert!(
+        cuts[0].1 == CutReason::Carried && (at..at + 5).contains(&cuts[0].0),
+        "{cuts:?}, carried at {at}"
+    );
+    assert!(worst_m < 0.1, "{worst_m}");
+}
+
+#[test]
+fn a_jump_that_the_scans_do_not_bear_out_is_a_cut() {
+    let (truth, scans, at) = carried(|before| before.compose(&Pose2::new(30.0, 0.0, 2.0)));
+    let (cuts, worst_m) = pieces(&truth, &scans);
+    assert_eq!(cuts.len(), 1, "{cuts:?}");
+    assert!(cuts[0].1 == CutReason::Jump && (at..at + 5).contains(&cuts[0].0), "{cuts:?}, jumped at {at}");
+    assert!(worst_m < 0.1, "{worst_m}");
+}
+
+#[test]
+fn a_covered_laser_is_a_cut_when_it_sees_another_place_afterwards() {
+    let (mut truth, mut scans, at) = carried(|before| *before);
+    for _ in 0..20 {
+        let blind = Scan { ranges_m: vec![f32::NAN; laser().num_ranges], ..scans[at - 1].clone() };
+        scans.insert(at, blind);
+        truth.insert(at, truth[at - 1]);
+    }
+    for (idx, scan) in scans.iter_mut().enumerate() {
+        scan.timestamp_ns = idx as i64 * 200_000_000;
+    }
+    let (cuts, worst_m) = pieces(&truth, &scans);
+    assert_eq!(cuts.len(), 1, "{cuts:?}");
+    assert!(cuts[0].1 == CutReason::NoReturns && (at + 20..at + 25).contains(&cuts[0].0), "{cuts:?}");
+    assert!(worst_m < 0.1, "{worst_m}");
+}
+
+#[test]
+fn a_laser_that_is_covered_where_the_robot_stands_or_drives_by_good_odometry_is_no_cut() {
+    let (truth, scans) = recording();
+    let blind = |scan: &Scan| Scan { ranges_m: vec![f32::NAN; laser().num_ranges], ..scan.clone() };
+    let driving: Vec<Scan> = (scans.iter().enumerate())
+        .map(|(idx, scan)| if (40..55).contains(&idx) { blind(scan) } else { scan.clone() })
+        .collect();
+    assert_eq!(pieces(&truth, &driving).0, []);
+    let mut standing = scans.clone();
+    (0..30).for_each(|_| standing.insert(60, blind(&scans[59])));
+    let mut stood = truth.clone();
+    (0..30).for_each(|_| stood.insert(60, truth[59]));
+    assert_eq!(pieces(&stood, &standing).0, []);
+    assert_eq!(pieces(&truth, &scans).0, []);
 }

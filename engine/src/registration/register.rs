@@ -100,7 +100,7 @@ pub(super) fn alignment_settings(config: &SubmapConfig) -> AlignmentSettings {
 }
 
 /// What one submap says of the returns of another.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Tally {
     /// Returns that lie on a surface.
     pub num_confirmed: u32,
@@ -139,7 +139,7 @@ impl Tally {
 }
 
 /// What two submaps at a given relative pose say of each other's returns.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Opinions {
     /// What the earlier says of the later.
     pub of_later: Tally,
@@ -162,6 +162,19 @@ impl Opinions {
         let has_opinions = |tally: &&Tally| tally.num_confirmed + tally.num_contradicted > 0;
         let directions = [self.of_later, self.of_earlier];
         directions.iter().filter(has_opinions).map(Tally::contradiction).fold(1.0, f64::min)
+    }
+
+    /// The same shares from fewer opinions where there are very many, so that sums never end.
+    #[must_use]
+    pub fn faded(&self) -> Self {
+        const NUM_MAX: u32 = 1 << 24;
+        let fade = |tally: &Tally| match tally.num_confirmed.max(tally.num_contradicted) > NUM_MAX {
+            true => {
+                Tally { num_confirmed: tally.num_confirmed / 2, num_contradicted: tally.num_contradicted / 2 }
+            }
+            false => *tally,
+        };
+        Self { of_later: fade(&self.of_later), of_earlier: fade(&self.of_earlier) }
     }
 
     /// Both ways together.

@@ -28,6 +28,8 @@ pub struct PlaceSampler {
     config: SamplingConfig,
     /// Where the robot last was beyond standing still.
     latest: Option<Place>,
+    /// Travel at which it begins, metres.
+    begins_at_m: f64,
     next_travel_m: f64,
     waiting: VecDeque<Place>,
 }
@@ -35,7 +37,19 @@ pub struct PlaceSampler {
 impl PlaceSampler {
     /// A sampler that has seen nothing. The config must have passed its check.
     pub fn new(config: &SamplingConfig) -> Self {
-        Self { config: config.clone(), latest: None, next_travel_m: 0.0, waiting: VecDeque::new() }
+        Self {
+            config: config.clone(),
+            latest: None,
+            begins_at_m: 0.0,
+            next_travel_m: 0.0,
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// Begins anew wherever the next scan is taken, and forgets what waits; the travel counts on.
+    pub fn restart(&mut self) {
+        self.begins_at_m = self.latest.take().map_or(self.begins_at_m, |latest| latest.travel_m);
+        self.waiting.clear();
     }
 
     /// Moves on to the pose of the next scan. `here.travel_m` is ignored: travel is counted here.
@@ -44,8 +58,8 @@ impl PlaceSampler {
     /// Nothing is observed along a jump; the place behind it is.
     pub fn drive(&mut self, mut here: Place) {
         let Some(latest) = &self.latest else {
-            here.travel_m = 0.0;
-            self.next_travel_m = self.config.observation_spacing_m;
+            here.travel_m = self.begins_at_m;
+            self.next_travel_m = here.travel_m + self.config.observation_spacing_m;
             self.waiting.push_back(here.clone());
             self.latest = Some(here);
             return;
@@ -135,6 +149,19 @@ mod tests {
         sampler.drive(at(1, 0.75));
         assert_eq!(xs(&mut sampler), [0.0, 0.1, 0.2]);
         assert!((sampler.next_waiting().map_or(0.0, |place| place.travel_m) - 0.3).abs() < 1e-9);
+    }
+
+    #[test]
+    fn travel_counts_on_after_a_restart() {
+        let mut sampler = PlaceSampler::new(&SamplingConfig { delay_m: 0.0, ..SamplingConfig::default() });
+        sampler.drive(at(0, 0.0));
+        sampler.drive(at(1, 0.35));
+        assert_eq!(xs(&mut sampler).len(), 4);
+        sampler.restart();
+        sampler.drive(at(2, 70.0));
+        sampler.drive(at(3, 70.15));
+        let travels = std::iter::from_fn(|| sampler.next_ready()).map(|place| place.travel_m);
+        assert!(travels.eq([0.35, 0.35 + 0.1]));
     }
 
     #[test]

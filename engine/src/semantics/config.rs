@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 use super::rooms::RoomsConfig;
 use crate::config_error::ConfigError;
 
+/// Who decides the label of a place.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LabelModel {
+    /// Rules on passages, bends, driven ways and open discs, after the thesis' decision tree.
+    Tree,
+    /// Trees learned from labelled buildings, and a hidden Markov chain along the run.
+    #[default]
+    Learned,
+}
+
 /// How places are labelled from the map.
 ///
 /// The lengths of forks and bends, the limits of corners and the smoothing were chosen on `aces`, `intel`, `mit-killian`
@@ -15,6 +26,9 @@ use crate::config_error::ConfigError;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SemanticsConfig {
+    /// Who decides the label of a place: the lengths and limits of passages, bends, driven ways and halls below are the
+    /// tree's.
+    pub model: LabelModel,
     /// Edge of a cell, metres.
     pub resolution_m: f64,
     /// Edge of the core of a block, metres: only a matter of memory.
@@ -78,6 +92,7 @@ pub struct SemanticsConfig {
 impl Default for SemanticsConfig {
     fn default() -> Self {
         Self {
+            model: LabelModel::default(),
             resolution_m: 0.1,
             block_m: 64.0,
             sight_m: 12.0,
@@ -117,7 +132,7 @@ impl SemanticsConfig {
         let flood_m = (self.fork_near_max_m + self.fork_length_m)
             .max(self.bend_near_m + self.bend_length_m)
             .max(self.driven_near_m + self.driven_length_m);
-        flood_m + 2.0 * self.hall_radius_m
+        (flood_m + 2.0 * self.hall_radius_m).max(super::features::REACH_M + 2.0)
     }
 
     /// Checks every value; `path` is the name of this part in the whole configuration.

@@ -96,6 +96,19 @@ impl Flood {
         }
     }
 
+    /// The cells that the last flood reached within a way, nearest first.
+    pub(super) fn reached_within(&self, block: &Block, way_m: f64) -> &[u32] {
+        let limit = Self::units(way_m, block);
+        let num = self.reached.partition_point(|&index| self.distance[index as usize] <= limit);
+        &self.reached[..num]
+    }
+
+    /// The longest way that the last flood went, metres.
+    pub(super) fn farthest_m(&self, block: &Block) -> f64 {
+        let farthest = self.reached.last().map_or(0, |&index| self.distance[index as usize]);
+        f64::from(farthest) / f64::from(EDGE_STEP) * block.resolution_m
+    }
+
     /// The passages that go on from `near_m` to `far_m` of the flood, in the order in which their first cell was
     /// reached.
     pub(super) fn passages(&mut self, block: &Block, near_m: f64, far_m: f64) -> Vec<Passage> {

@@ -5,8 +5,10 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::block::{Block, BlockEvidence};
-use super::config::SemanticsConfig;
+use super::config::{LabelModel, SemanticsConfig};
+use super::features::{FeatureReader, NUM_OWN, TURN_REACHES_M, WAY_M, with_context};
 use super::label::PlaceLabel;
+use super::learned::LearnedLabels;
 use super::rules::label_of;
 use super::signature::{PlaceSignature, SignatureReader};
 use crate::geometry::{Point2, Pose2, angle_between};
@@ -43,9 +45,10 @@ pub struct LabeledRun {
     pub labels: Vec<PlaceLabel>,
     /// The share of what was seen nearby that agrees with the label, in [0, 1].
     pub confidences: Vec<f32>,
-    /// The surroundings looked at, with the observation that they belong to.
-    pub signatures: Vec<(usize, PlaceSignature)>,
 }
+
+/// Observations from one position of the way around a sample to the next.
+const WAY_STEP: usize = 4;
 
 /// A position whose surroundings are looked at.
 #[derive(Clone, Copy)]
@@ -53,13 +56,64 @@ struct Sample {
     run_idx: usize,
     observation_idx: usize,
     position: Point2,
+    /// The largest turn nearby.
     turn_rad: f64,
+    /// Turns here, over several reaches.
+    turns_rad: [f64; 3],
 }
 
 /// Labels every observation of runs that share one map frame.
 ///
 /// The label belongs to the place: it is decided by what all runs saw around it and by where any of them drove.
 pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<LabeledRun> {
+    match config.model {
+        LabelModel::Tree => {
+            let read = read_runs(config, runs, |block, samples| read_signatures(config, block, samples));
+            runs.iter().zip(read).map(|(run, signatures)| label_by_rules(config, run, &signatures)).collect()
+        }
+        LabelModel::Learned => {
+            let model = LearnedLabels::built_in();
+            let read = place_numbers(config, runs);
+            runs.iter().zip(&read).map(|(run, numbers)| label_numbers(config, model, run, numbers)).collect()
+        }
+    }
+}
+
+/// The numbers that the learned labels are decided by, with the observation of each position, for each run.
+pub fn place_numbers(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<Vec<(usize, Vec<f32>)>> {
+    let read = read_runs(config, runs, |block, samples| {
+        let mut reader = FeatureReader::new(block);
+        samples
+            .iter()
+            .map(|sample| match block.index(&sample.position) {
+                Some(cell) => reader.read(cell, sample.turns_rad, &way_around(&runs[sample.run_idx], sample)),
+                None => vec![0.0; NUM_OWN],
+            })
+            .collect()
+    });
+    read.into_iter()
+        .map(|own| {
+            let (observations, own): (Vec<usize>, Vec<Vec<f32>>) = own.into_iter().unzip();
+            observations.into_iter().zip(with_context(&own, config.spacing_m)).collect()
+        })
+        .collect()
+}
+
+/// Positions of a run around a sample, until either is too far off.
+fn way_around(run: &DrivenRun<'_>, sample: &Sample) -> Vec<Point2> {
+    let poses = &run.map_from_observations;
+    let near = |pose: &&Pose2| pose.position().distance(&sample.position) <= WAY_M;
+    let before = poses[..sample.observation_idx].iter().rev().take_while(near);
+    let after = poses[sample.observation_idx..].iter().take_while(near);
+    before.chain(after).step_by(WAY_STEP).map(Pose2::position).collect()
+}
+
+/// Reads the surroundings of positions along all runs, block by block; for each run in order of travel.
+fn read_runs<T: Send>(
+    config: &SemanticsConfig,
+    runs: &[DrivenRun<'_>],
+    read: impl Fn(&Block, &[Sample]) -> Vec<T> + Sync,
+) -> Vec<Vec<(usize, T)>> {
     let samples: Vec<Sample> =
         runs.iter().enumerate().flat_map(|(run_idx, run)| samples_of(config, run_idx, run)).collect();
     let mut blocks: BTreeMap<(i64, i64), Vec<Sample>> = BTreeMap::new();
@@ -68,19 +122,16 @@ pub fn label_runs(config: &SemanticsConfig, runs: &[DrivenRun<'_>]) -> Vec<Label
         blocks.entry((key(sample.position.x), key(sample.position.y))).or_default().push(sample);
     }
     let blocks: Vec<Vec<Sample>> = blocks.into_values().collect();
-    let read: Vec<Vec<PlaceSignature>> =
-        blocks.par_iter().map(|samples| read_block(config, runs, samples)).collect();
-    let mut signatures: Vec<Vec<(usize, PlaceSignature)>> = vec![Vec::new(); runs.len()];
-    for (sample, signature) in blocks.iter().flatten().zip(read.into_iter().flatten()) {
-        signatures[sample.run_idx].push((sample.observation_idx, signature));
+    let found: Vec<Vec<T>> =
+        blocks.par_iter().map(|samples| read(&build_block(config, runs, samples), samples)).collect();
+    let mut by_run: Vec<Vec<(usize, T)>> = runs.iter().map(|_| Vec::new()).collect();
+    for (sample, surroundings) in blocks.iter().flatten().zip(found.into_iter().flatten()) {
+        by_run[sample.run_idx].push((sample.observation_idx, surroundings));
     }
-    runs.iter()
-        .zip(signatures)
-        .map(|(run, mut signatures)| {
-            signatures.sort_by_key(|(observation_idx, _)| *observation_idx);
-            label_run(config, run, signatures)
-        })
-        .collect()
+    for run in &mut by_run {
+        run.sort_by_key(|(observation_idx, _)| *observation_idx);
+    }
+    by_run
 }
 
 /// Positions of a run a little travel apart; the first is always one of them.
@@ -95,17 +146,23 @@ fn samples_of(config: &SemanticsConfig, run_idx: usize, run: &DrivenRun<'_>) -> 
     for (observation_idx, pose) in poses.iter().enumerate() {
         if travel_m[observation_idx] >= next_m - 1e-9 {
             next_m = travel_m[observation_idx] + config.spacing_m;
-            let turn_rad = turn_at(config, poses, &travel_m, observation_idx);
-            samples.push(Sample { run_idx, observation_idx, position: pose.position(), turn_rad });
+            let turn = |reach_m: f64| turn_at(poses, &travel_m, observation_idx, reach_m);
+            samples.push(Sample {
+                run_idx,
+                observation_idx,
+                position: pose.position(),
+                turn_rad: turn(config.turn_reach_m),
+                turns_rad: TURN_REACHES_M.map(turn),
+            });
         }
     }
     widen_turns(config, samples)
 }
 
 /// Angle between the chords to a position from some travel before and from it to some travel after.
-fn turn_at(config: &SemanticsConfig, poses: &[Pose2], travel_m: &[f64], at: usize) -> f64 {
-    let before = travel_m.partition_point(|&travel| travel < travel_m[at] - config.turn_reach_m);
-    let after = travel_m.partition_point(|&travel| travel <= travel_m[at] + config.turn_reach_m) - 1;
+fn turn_at(poses: &[Pose2], travel_m: &[f64], at: usize, reach_m: f64) -> f64 {
+    let before = travel_m.partition_point(|&travel| travel < travel_m[at] - reach_m);
+    let after = travel_m.partition_point(|&travel| travel <= travel_m[at] + reach_m) - 1;
     let direction = |from: usize, to: usize| {
         let (dx, dy) = (poses[to].x - poses[from].x, poses[to].y - poses[from].y);
         (dx.hypot(dy) > 1e-6).then(|| dy.atan2(dx))
@@ -127,10 +184,9 @@ fn widen_turns(config: &SemanticsConfig, mut samples: Vec<Sample>) -> Vec<Sample
     samples
 }
 
-/// The surroundings of positions that lie in one block.
-fn read_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Sample]) -> Vec<PlaceSignature> {
-    let block = build_block(config, runs, samples);
-    let mut reader = SignatureReader::new(config, &block);
+/// The surroundings of positions that lie in one block, as the rules want them.
+fn read_signatures(config: &SemanticsConfig, block: &Block, samples: &[Sample]) -> Vec<PlaceSignature> {
+    let mut reader = SignatureReader::new(config, block);
     samples
         .iter()
         .map(|sample| match block.index(&sample.position) {
@@ -173,29 +229,54 @@ fn build_block(config: &SemanticsConfig, runs: &[DrivenRun<'_>], samples: &[Samp
     evidence.finish()
 }
 
-/// Labels of all observations from those of the positions looked at.
-fn label_run(
+/// By the rules: the majority of the labels around each position.
+fn label_by_rules(
     config: &SemanticsConfig,
     run: &DrivenRun<'_>,
-    signatures: Vec<(usize, PlaceSignature)>,
+    signatures: &[(usize, PlaceSignature)],
 ) -> LabeledRun {
     let raw: Vec<PlaceLabel> = signatures.iter().map(|(_, signature)| label_of(config, signature)).collect();
     let reach = (config.smoothing_m / config.spacing_m).round() as usize;
-    let smooth: Vec<(PlaceLabel, f32)> = (0..raw.len()).map(|at| majority(&raw, at, reach)).collect();
+    let positions = signatures.iter().enumerate().map(|(at, (observation_idx, _))| {
+        let (label, confidence) = majority(&raw, at, reach);
+        (*observation_idx, label, confidence)
+    });
+    spread(run, &positions.collect::<Vec<_>>())
+}
+
+/// Labels of a run by a learned model, from the numbers of its places.
+pub fn label_numbers(
+    config: &SemanticsConfig,
+    model: &LearnedLabels,
+    run: &DrivenRun<'_>,
+    numbers: &[(usize, Vec<f32>)],
+) -> LabeledRun {
+    let likelihoods: Vec<[f64; 5]> = numbers.iter().map(|(_, numbers)| model.likelihoods(numbers)).collect();
+    let positions = model.in_sequence(&likelihoods, config.spacing_m);
+    let labeled: Vec<(usize, PlaceLabel, f32)> = numbers
+        .iter()
+        .zip(positions)
+        .map(|((observation_idx, _), (label, confidence))| (*observation_idx, label, confidence))
+        .collect();
+    spread(run, &labeled)
+}
+
+/// Labels of all observations from those of the positions looked at, the nearest for each.
+fn spread(run: &DrivenRun<'_>, positions: &[(usize, PlaceLabel, f32)]) -> LabeledRun {
     let num_observations = run.map_from_observations.len();
     let mut labels = Vec::with_capacity(num_observations);
     let mut confidences = Vec::with_capacity(num_observations);
     let mut nearest = 0;
     for observation_idx in 0..num_observations {
-        let distance = |position: usize| signatures[position].0.abs_diff(observation_idx);
-        while nearest + 1 < signatures.len() && distance(nearest + 1) <= distance(nearest) {
+        let distance = |position: usize| positions[position].0.abs_diff(observation_idx);
+        while nearest + 1 < positions.len() && distance(nearest + 1) <= distance(nearest) {
             nearest += 1;
         }
-        let (label, confidence) = smooth[nearest];
+        let (_, label, confidence) = positions[nearest];
         labels.push(label);
         confidences.push(confidence);
     }
-    LabeledRun { labels, confidences, signatures }
+    LabeledRun { labels, confidences }
 }
 
 /// The most frequent label within `reach` positions and its share; of equals the one in the middle, else the first.

@@ -61,8 +61,14 @@ struct Labeled {
 }
 
 impl Labeled {
+    /// By the rules.
     fn new(building: &Building, corners: &[(f64, f64)]) -> Self {
-        let (geometry, poses, config) = (geometry(), drive(corners), SemanticsConfig::default());
+        Self::by(LabelModel::Tree, building, corners)
+    }
+
+    fn by(model: LabelModel, building: &Building, corners: &[(f64, f64)]) -> Self {
+        let config = SemanticsConfig { model, ..SemanticsConfig::default() };
+        let (geometry, poses) = (geometry(), drive(corners));
         let ranges: Vec<Vec<f32>> =
             poses.iter().step_by(2).map(|pose| building.scan(&geometry, pose)).collect();
         let scans = poses.iter().step_by(2).copied().zip(ranges.iter().map(Vec::as_slice)).collect();
@@ -118,6 +124,26 @@ fn a_visited_room_is_a_dead_end_and_a_large_one_on_the_way_a_hall() {
     assert_eq!(labeled.label_at(10.0, 4.5), PlaceLabel::DeadEnd);
     assert_eq!(labeled.label_at(25.0, 1.0), PlaceLabel::Hall);
     assert_eq!(labeled.label_at(38.0, 1.0), PlaceLabel::Corridor);
+}
+
+#[test]
+fn the_learned_labels_know_the_same_places() {
+    let crossing = Building(vec![(0.0, 0.0, 40.0, 2.0), (19.0, 0.0, 21.0, 20.0)]);
+    let labeled = Labeled::by(LabelModel::Learned, &crossing, &[(1.0, 1.0), (39.0, 1.0)]);
+    assert_eq!(labeled.label_at(20.0, 1.0), PlaceLabel::Bifurcation);
+    assert_eq!(labeled.label_at(10.0, 1.0), PlaceLabel::Corridor);
+    let turn = Building(vec![(0.0, 0.0, 22.0, 2.0), (20.0, 0.0, 22.0, 22.0)]);
+    let labeled = Labeled::by(LabelModel::Learned, &turn, &[(1.0, 1.0), (21.0, 1.0), (21.0, 21.0)]);
+    assert_eq!(labeled.label_at(21.0, 1.0), PlaceLabel::Corner);
+    assert_eq!(labeled.label_at(21.0, 12.0), PlaceLabel::Corridor);
+    let rooms = Building(vec![(0.0, 0.0, 20.0, 2.0), (9.5, 1.9, 10.5, 2.6), (8.0, 2.5, 12.0, 6.5)]);
+    let way = [(1.0, 1.0), (10.0, 1.0), (10.0, 5.0), (10.0, 1.0), (19.0, 1.0)];
+    let labeled = Labeled::by(LabelModel::Learned, &rooms, &way);
+    assert_eq!(labeled.label_at(10.0, 4.5), PlaceLabel::DeadEnd);
+    assert_eq!(labeled.label_at(4.0, 1.0), PlaceLabel::Corridor);
+    let hall = Building(vec![(0.0, 0.0, 24.0, 20.0)]);
+    let labeled = Labeled::by(LabelModel::Learned, &hall, &[(4.0, 4.0), (20.0, 5.0), (18.0, 16.0)]);
+    assert_eq!(labeled.label_at(15.0, 5.0), PlaceLabel::Hall);
 }
 
 #[test]

@@ -92,6 +92,15 @@ impl TextBuilder {
         open.map_or_else(Vec::new, |closed| self.write(closed))
     }
 
+    /// Ends the text as [`TextBuilder::finish`] does, and goes on with words that follow none of those before.
+    pub fn cut(&mut self) -> Vec<Word> {
+        let words = self.finish();
+        self.latest.clear();
+        self.positions.clear();
+        self.first_position = self.num_observations;
+        words
+    }
+
     /// Algorithm 5.2: the alternative words that end at the last word, then the new word with its predecessors.
     fn write(&mut self, region: Region) -> Vec<Word> {
         let mut words = self.alternatives();

@@ -17,7 +17,7 @@ use locution_engine::semantics::{LabelPattern, PlaceLabel};
 
 use super::ask::find_words;
 use super::maps::{MatchFilter, MatchOrder, decide, find_labels, matches, undecide};
-use super::runs::{Frame, NewBatch, NewRun, trajectory};
+use super::runs::{Frame, NewBatch, NewRun, RunPiece, pieces, trajectory};
 use super::site::Site;
 use super::{App, AppError, Name};
 use crate::config::ServerConfig;
@@ -88,7 +88,6 @@ fn open_app(disk: &Disk) -> Arc<App> {
     let mut config = ServerConfig::default();
     config.builds.is_automatic = false;
     config.storage.num_scans_per_checkpoint = 50;
-    config.limits.odometry_step_max_m = 2.0;
     Arc::new(App::new(config, disk.storage()))
 }
 
@@ -109,6 +108,7 @@ impl Stage {
             ["send", run, drive, range] => self.send(run, drive, range).await,
             ["finish", run] => self.finish(run).await,
             ["words", run, level] => self.words(run, level.parse().unwrap()).await,
+            ["pieces", run] => self.pieces(run).await,
             ["poses", run, frame, seqs @ ..] => self.poses(run, frame, seqs).await,
             ["ask", "words", patterns @ ..] => self.ask_words(patterns).await,
             ["ask", "labels", patterns @ ..] => self.ask_labels(patterns).await,
@@ -218,6 +218,20 @@ impl Stage {
         Ok(words.iter().map(line).collect())
     }
 
+    /// Scans of each piece of a run, why it is one, and its component.
+    async fn pieces(&self, run: &str) -> Result<String, AppError> {
+        let site = self.site().await?;
+        let found = pieces(&site, &site.run(&name(run)).await?, None).await?;
+        let line = |piece: &RunPiece| {
+            let reason = piece.reason.map_or(String::new(), |reason| format!(", {reason:?}"));
+            let place = piece.in_map.map_or(String::new(), |(component, length_m)| {
+                format!(", {length_m:.0} m in component {component}")
+            });
+            format!("scans {} to {}{reason}{place}\n", piece.from_scan, piece.to_scan)
+        };
+        Ok(found.iter().map(line).collect())
+    }
+
     async fn poses(&self, run: &str, frame: &str, seqs: &[&str]) -> Result<String, AppError> {
         let frame = match frame {
             "map" => Frame::Map,
@@ -225,7 +239,7 @@ impl Stage {
             _ => Frame::Odom,
         };
         let site = self.site().await?;
-        let found = trajectory(&site, &site.run(&name(run)).await?, frame, None).await?;
+        let found = trajectory(&site, &site.run(&name(run)).await?, frame, None, None).await?;
         let line = |seq: &&str| {
             let pose = found.poses[seq.parse::<usize>().unwrap()].frame_from_robot;
             let decimeters = |meters: f64| f64::from(whole(meters * 10.0)) / 10.0;

@@ -359,7 +359,7 @@ pub async fn get_graph_g2o(at: MapAt) -> Result<Response, ApiError> {
         (status = 409, description = "No map has been built yet")))]
 pub async fn get_map_tum(at: MapAt) -> Result<Response, ApiError> {
     let body = async {
-        let ways = ways_of_runs(&at.site, &at.map, at.component.unwrap_or(0)).await?;
+        let ways = ways_of_runs(&at.map, at.component.unwrap_or(0)).await?;
         let poses: Vec<_> = ways.into_iter().flat_map(|(_, poses)| poses).collect();
         Ok(trajectory_as_tum(&poses).into_bytes())
     };
@@ -377,7 +377,7 @@ pub async fn get_map_mcap(grid_at: GridAt) -> Result<Response, ApiError> {
     let at = &grid_at.at;
     let body = async {
         let grid = grid_at.grid().await?;
-        let ways = ways_of_runs(&at.site, &at.map, at.component.unwrap_or(0)).await?;
+        let ways = ways_of_runs(&at.map, at.component.unwrap_or(0)).await?;
         let file = on_blocking_thread(move || map_as_mcap(&grid, &ways)).await?;
         Ok(file.map_err(AppError::internal)?)
     };

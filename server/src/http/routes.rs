@@ -36,6 +36,7 @@ pub(crate) fn routes() -> OpenApiRouter<AppState> {
         .ruled(READ, routes!(runs::get_run))
         .ruled(WRITE, routes!(runs::make_run, runs::delete_run))
         .ruled(WRITE, routes!(runs::finish_run))
+        .ruled(READ, routes!(runs::list_pieces))
         .ruled(WRITE.with_scans(), routes!(batches::append_batch))
         .ruled(READ, routes!(batches::list_scans))
         .ruled(READ, routes!(texts::list_observations))

@@ -54,6 +54,8 @@ pub enum Key {
     Keyframes(Generation, RunIdx, u64),
     /// The text of a finished run, packed, in parts of less than one mebibyte.
     PackedText(Generation, RunIdx, u32),
+    /// Why a run falls in two before a scan.
+    Cut(Generation, RunIdx, u64),
     /// What a map version is.
     Map(MapVersion),
     /// One part of a map version: which kind, and its number within.
@@ -99,6 +101,9 @@ impl Key {
             Key::PackedText(generation, run, part) => {
                 Writer::new(0x15).u32(*generation).u32(*run).u32(*part).done()
             }
+            Key::Cut(generation, run, scan_seq) => {
+                Writer::new(0x16).u32(*generation).u32(*run).u64(*scan_seq).done()
+            }
             Key::Map(version) => Writer::new(0x20).u64(*version).done(),
             Key::MapPart(version, kind, part) => {
                 Writer::new(0x21).u64(*version).u8(*kind as u8).u64(*part).done()
@@ -130,7 +135,7 @@ impl Key {
 
     /// The prefixes of everything of a run that belongs to a text generation.
     pub fn all_of_text(generation: Generation, run: RunIdx) -> Vec<Vec<u8>> {
-        (0x10..=0x15).map(|tag| Writer::new(tag).u32(generation).u32(run).done()).collect()
+        (0x10..=0x16).map(|tag| Writer::new(tag).u32(generation).u32(run).done()).collect()
     }
 
     /// The prefix of all observations of a run.
@@ -148,6 +153,11 @@ impl Key {
         Writer::new(0x14).u32(generation).u32(run).done()
     }
 
+    /// The prefix of all cuts of a run.
+    pub fn all_cuts(generation: Generation, run: RunIdx) -> Vec<u8> {
+        Writer::new(0x16).u32(generation).u32(run).done()
+    }
+
     /// The prefix of all packed texts of a generation.
     pub fn all_packed_texts(generation: Generation) -> Vec<u8> {
         Writer::new(0x15).u32(generation).done()
@@ -160,7 +170,7 @@ impl Key {
 
     /// The prefixes of everything that belongs to a text generation.
     pub fn all_of_generation(generation: Generation) -> Vec<Vec<u8>> {
-        (0x10..=0x15).map(|tag| Writer::new(tag).u32(generation).done()).collect()
+        (0x10..=0x16).map(|tag| Writer::new(tag).u32(generation).done()).collect()
     }
 
     /// The prefix of all parts of one kind of a map version.
@@ -301,6 +311,7 @@ mod tests {
             any::<(u32, u32, u32)>().prop_map(|(g, run, part)| Key::PackedText(g, run, part)),
             (any::<u64>(), any_part(), any::<u64>()).prop_map(|(v, kind, part)| Key::MapPart(v, kind, part)),
             any::<(u64, u64)>().prop_map(|(v, number)| Key::Match(v, number)),
+            any::<(u32, u32, u64)>().prop_map(|(g, run, scan_seq)| Key::Cut(g, run, scan_seq)),
             any::<u64>().prop_map(Key::Decision),
             any::<u64>().prop_map(Key::Job),
             any::<u32>().prop_map(Key::Registrations),

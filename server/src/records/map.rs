@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
+use locution_engine::geometry::Pose2;
 use locution_engine::mapping::PlaceMatch;
 use locution_engine::recording::{PlacedKeyframe, RunTrajectory};
 use locution_engine::scan::Scan;
 use locution_engine::semantics::{MapRooms, PlaceMap};
 
 use super::codec;
-use super::keys::{Key, PartKind};
+use super::keys::{Key, PartKind, RunIdx};
 use super::pieces::{join_pieces, pieces};
 use super::reader::SiteReader;
 use super::run::Run;
@@ -24,7 +25,7 @@ pub struct Map {
     reader: SiteReader,
 }
 
-/// A run at its poses in a map.
+/// A run, or a piece of one, at its poses in a map.
 #[derive(Clone)]
 pub struct PlacedRun {
     /// Its part in the map.
@@ -54,7 +55,19 @@ impl Map {
         self.part(PartKind::Poses, run.first_pose..run.first_pose + run.num_poses).await
     }
 
-    /// Where a run was at any scan.
+    /// Where a run was at any scan, piece by piece; nowhere when it is not in the map.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`] when one of its keyframes is missing.
+    pub async fn places_of(&self, run: RunIdx) -> Result<RunPlaces, StorageError> {
+        let mut pieces = Vec::new();
+        for piece in self.record.pieces_of(run) {
+            pieces.push((piece.clone(), self.trajectory(piece).await?));
+        }
+        Ok(RunPlaces { pieces })
+    }
+
+    /// Where a run, or a piece of one, was at any scan of it.
     ///
     /// # Errors
     /// [`StorageError::Corrupt`] when one of its keyframes is missing.
@@ -163,6 +176,20 @@ impl Map {
     }
 }
 
+/// Where a run was in a map, piece by piece.
+pub struct RunPlaces {
+    pieces: Vec<(MapRun, RunTrajectory)>,
+}
+
+impl RunPlaces {
+    /// The component and the pose in it at a scan at which the run's own motion had brought it to `run_from_robot`;
+    /// `None` for scans that are not in the map.
+    pub fn at(&self, scan_seq: u64, run_from_robot: &Pose2) -> Option<(u32, Pose2)> {
+        let (piece, trajectory) = self.pieces.iter().find(|(piece, _)| piece.scans().contains(&scan_seq))?;
+        Some((piece.component, trajectory.at(scan_seq, run_from_robot)?))
+    }
+}
+
 /// Whether more is wanted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Visit {
@@ -195,9 +222,11 @@ impl PlacedRun {
     }
 }
 
-/// Keyframes that came after the map was built have no pose in it.
+/// Keyframes of other pieces, and those that came after the map was built, have no pose among these.
 fn trajectory_of(keyframes: &[StoredKeyframe], poses: &[MapPose]) -> RunTrajectory {
-    let placed = keyframes.iter().zip(poses);
+    let first = poses.first().map_or(0, |first| first.scan_seq);
+    let of_piece = keyframes.iter().skip_while(|keyframe| keyframe.scan_seq < first);
+    let placed = of_piece.zip(poses);
     placed
         .map(|(keyframe, pose)| PlacedKeyframe {
             scan_seq: keyframe.scan_seq,

@@ -33,11 +33,11 @@ pub use annotation::{Annotation, Shape};
 pub use channel::{Channel, ChannelMove, RobotReport};
 pub use deletion::delete_prefixes;
 pub use keys::{Generation, Key, MapVersion, PartKind, RunIdx};
-pub use map::{Map, PlacedRun, Visit, append_places, append_rooms, match_chunks};
+pub use map::{Map, PlacedRun, RunPlaces, Visit, append_places, append_rooms, match_chunks};
 pub use pieces::{join_pieces, pieces};
 pub use reader::SiteReader;
 pub use run::Run;
-pub use scans::{append_scans, find_receipt, is_same_scan, read_scans};
+pub use scans::{append_scans, find_receipt, is_same_scan, read_scans, read_stamps};
 pub use stored::{
     JobKind, JobRecord, JobState, ReadingRules, Receipt, Retention, RunHead, RunRecord, SiteRecord,
     StoredKeyframe, TextHead,

@@ -7,7 +7,9 @@ use locution_engine::geometry::Pose2;
 use locution_engine::mapping::Keyframe;
 use locution_engine::scan::Scan;
 use locution_engine::text::{Observation, Word};
+use locution_engine::translator::Cut;
 
+use super::codec;
 use super::keys::{Key, RunIdx};
 use super::reader::SiteReader;
 use super::scans::{read_scans, read_stamps};
@@ -93,6 +95,24 @@ impl Run {
     /// [`StorageError::Corrupt`] when one of them is missing.
     pub async fn stamps(&self) -> Result<Vec<(i64, Pose2)>, StorageError> {
         read_stamps(self.reader.store(), self.idx, 0..self.head.next_sequence).await
+    }
+
+    /// Where the run falls in pieces, in order.
+    ///
+    /// # Errors
+    /// [`StorageError::Corrupt`] when one of them cannot be read.
+    pub async fn cuts(&self) -> Result<Vec<Cut>, StorageError> {
+        let prefix = Key::all_cuts(self.reader.generation(), self.idx);
+        let mut cuts = Vec::new();
+        for (key, bytes) in self.reader.store().scan(&prefix, &[], usize::MAX).await? {
+            let corrupt = || StorageError::Corrupt { what: "the key of a cut".into() };
+            let scan_seq = Key::last_u64(&key).ok_or_else(corrupt)?;
+            // What came after the run was opened is not of it.
+            if scan_seq < self.text.num_scans {
+                cuts.push(Cut { scan_seq, reason: codec::decode(&bytes, "a cut")? });
+            }
+        }
+        Ok(cuts)
     }
 
     /// All keyframes without their readings, which stand with the scans.

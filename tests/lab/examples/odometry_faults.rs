@@ -13,7 +13,7 @@ use locution_engine::formats::{
     CarmenLog, CarmenOptions, Relation, parse_relations, parse_truth, read_carmen_log,
 };
 use locution_engine::geometry::{Pose2, wrap_angle};
-use locution_engine::mapping::{Keyframe, RegistrationMemo, RunRecord, map_site};
+use locution_engine::mapping::{Keyframe, RegistrationMemo, RunRecord, SitePieces, map_site};
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::text::{Observation, Word};
 use locution_engine::translator::{Translation, Translator};
@@ -47,12 +47,15 @@ struct Driven {
     words: Vec<Word>,
     keyframes: Vec<Keyframe>,
     run_from_robot: Vec<Pose2>,
+    /// First scans of the pieces but for the first.
+    cuts: Vec<u64>,
 }
 
 impl Driven {
     fn take(&mut self, translation: Translation, scans: &[Scan]) {
         self.observations.extend(translation.observations);
         self.words.extend(translation.words);
+        self.cuts.extend(translation.cut.map(|cut| cut.scan_seq));
         if let Some(pose) = translation.keyframe {
             self.keyframes.push(Keyframe {
                 scan_seq: pose.scan_seq,
@@ -107,8 +110,8 @@ impl std::fmt::Display for Errors {
     }
 }
 
-/// Errors of the motion over the window, metres and degrees, one for every half metre.
-fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(f64, f64)> {
+/// Errors of the motion over the window, metres and degrees, one for every half metre, but for those across cuts.
+fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>], cuts: &[u64]) -> Vec<(f64, f64)> {
     let known: Vec<usize> = (0..truth.len()).filter(|&idx| truth[idx].is_some()).collect();
     let true_pose = |idx: usize| truth[idx].unwrap_or_default();
     let mut travel_m = vec![0.0];
@@ -124,22 +127,34 @@ fn open_loop(poses: &[Pose2], truth: &[Option<Pose2>]) -> Vec<(f64, f64)> {
         next_m = travel_m[end] + 0.5;
         let start = travel_m.partition_point(|&travel| travel < travel_m[end] - WINDOW_M);
         let (from, to) = (known[start], known[end]);
+        if cuts.iter().any(|&cut| (from as u64) < cut && cut <= to as u64) {
+            continue;
+        }
         let difference = true_pose(from).between(&true_pose(to)).between(&poses[from].between(&poses[to]));
         errors.push((difference.x.hypot(difference.y), difference.theta.abs().to_degrees()));
     }
     errors
 }
 
-fn mapped_poses(scans: &[Scan], driven: &Driven, map_from_keyframes: &[Pose2]) -> Vec<EstimatedPose> {
+/// Poses of the scans of a piece, whose keyframes are placed.
+fn mapped_poses(
+    scans: &[Scan],
+    held: std::ops::Range<usize>,
+    run_from_robot: &[Pose2],
+    (keyframes, map_from_keyframes): (&[Keyframe], &[Pose2]),
+    component: u32,
+) -> Vec<EstimatedPose> {
     let place = |scan_seq: usize| {
-        let after = driven.keyframes.partition_point(|keyframe| keyframe.scan_seq <= scan_seq as u64);
+        let after = keyframes.partition_point(|keyframe| keyframe.scan_seq <= scan_seq as u64);
         let first = after.saturating_sub(1);
-        let before = driven.keyframes.get(first)?;
-        let run = |seq: u64| driven.run_from_robot[seq as usize];
-        let moved = |seq: u64| map_from_keyframes[first].compose(&run(before.scan_seq).between(&run(seq)));
-        let here = moved(scan_seq as u64);
-        let Some(next) = driven.keyframes.get(after).filter(|_| after > 0) else { return Some(here) };
-        let (carried, known) = (moved(next.scan_seq), map_from_keyframes[after]);
+        let before = keyframes.get(first)?;
+        let run = |seq: u64| run_from_robot[seq as usize];
+        let moved = |seq: u64| {
+            map_from_keyframes.get(first).map(|at| at.compose(&run(before.scan_seq).between(&run(seq))))
+        };
+        let here = moved(scan_seq as u64)?;
+        let Some(next) = keyframes.get(after).filter(|_| after > 0) else { return Some(here) };
+        let (carried, known) = (moved(next.scan_seq)?, map_from_keyframes.get(after)?);
         let share = (scan_seq as u64 - before.scan_seq) as f64 / (next.scan_seq - before.scan_seq) as f64;
         Some(Pose2::new(
             here.x + share * (known.x - carried.x),
@@ -147,14 +162,14 @@ fn mapped_poses(scans: &[Scan], driven: &Driven, map_from_keyframes: &[Pose2]) -
             here.theta + share * wrap_angle(known.theta - carried.theta),
         ))
     };
-    let estimated = |(scan_seq, scan): (usize, &Scan)| {
+    let estimated = |scan_seq: usize| {
         place(scan_seq).map(|map_from_robot| EstimatedPose {
-            timestamp_ns: scan.timestamp_ns,
-            component: 0,
+            timestamp_ns: scans[scan_seq].timestamp_ns,
+            component: u64::from(component),
             map_from_robot,
         })
     };
-    scans.iter().enumerate().filter_map(estimated).collect()
+    held.filter_map(estimated).collect()
 }
 
 /// Every so many readings of the recording, as many as wanted, about its middle.
@@ -234,7 +249,7 @@ fn judge(
     let began = Instant::now();
     let driven = translate(&options.config, &log.geometry, &log.scans)?;
     let scans_per_s = log.scans.len() as f64 / began.elapsed().as_secs_f64();
-    let errors = open_loop(&driven.run_from_robot, truth);
+    let errors = open_loop(&driven.run_from_robot, truth, &driven.cuts);
     let meters = Errors::of(errors.iter().map(|error| error.0).collect());
     let degrees = Errors::of(errors.iter().map(|error| error.1).collect());
     print!("{recording:12} {name:18} {num_faults:2} faults, over {WINDOW_M} m {meters} m, {degrees}°");
@@ -250,11 +265,20 @@ fn judge(
             keyframes: &driven.keyframes,
             area: None,
         };
-        let map = map_site(&options.config.mapping, &[record], &[], &mut RegistrationMemo::default())?;
-        let poses = map
-            .runs
-            .first()
-            .map_or(Vec::new(), |run| mapped_poses(&log.scans, &driven, &run.map_from_keyframes));
+        let pieces = SitePieces::new(&[record], std::slice::from_ref(&driven.cuts));
+        let map =
+            map_site(&options.config.mapping, &pieces.records(), &[], &mut RegistrationMemo::default())?;
+        let mut poses = Vec::new();
+        for (piece, mapped) in pieces.pieces().iter().zip(&map.runs) {
+            let (scans, keyframes) = (&piece.scans, &piece.keyframes);
+            let held = scans.start as usize..(scans.end as usize).min(log.scans.len());
+            let keyframes = &driven.keyframes[keyframes.start as usize..keyframes.end as usize];
+            let placed = (keyframes, mapped.map_from_keyframes.as_slice());
+            poses.extend(mapped_poses(&log.scans, held, &driven.run_from_robot, placed, mapped.component));
+        }
+        print!("; {} pieces in {} components", map.runs.len(), map.num_components);
+        row["pieces"] = json!(map.runs.len());
+        row["components"] = json!(map.num_components);
         let report = judge_map(&poses, relations);
         let (place, turn) = (&report.translation_m, &report.rotation_deg);
         print!("; map {:.4} ± {:.4} m, {:.3} ± {:.3}°", place.mean, place.sd, turn.mean, turn.sd);

@@ -5,6 +5,7 @@
 //! - [`density_field`], [`particle_filter`]: Monte-Carlo localisation as the thesis has it (chapter 3)
 //! - [`thesis`]: its scenarios and tables
 //! - [`open_world`]: robots on maps of their own building, of a part of it, and of others, without a server
+//! - [`place_learning`]: labeled drives, training of place labels, and buildings left out
 //! - [`room_trials`]: rooms and doors of plans, judged
 //! - [`recordings`], [`worlds`], [`report`], [`plot`]: files in, tables and pictures out
 //!
@@ -15,6 +16,7 @@ pub mod density_field;
 pub mod evaluation;
 pub mod open_world;
 pub mod particle_filter;
+pub mod place_learning;
 pub mod plot;
 pub mod recordings;
 pub mod report;

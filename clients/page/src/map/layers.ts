@@ -4,7 +4,7 @@ import type { Schemas } from "../api";
 import { CHANGE_COLORS, CHANNEL_DASHES, CLASS_COLORS, LABEL_COLORS, ROOM_COLORS, STATE_COLORS, runColor } from "../colors";
 import { DENSITY_STEPS } from "../drives";
 import type { Drive } from "../drives";
-import { ellipseOf } from "../geometry";
+import { Bounds, ellipseOf } from "../geometry";
 import type { Point, Pose } from "../geometry";
 import type { Drawing } from "./camera";
 import type { Grid } from "./grid";
@@ -208,14 +208,15 @@ export function drawArrow(drawing: Drawing, pose: Pose, color: string, size: num
 }
 
 export function labelsLayer(labels: Schemas["Label"][]): Layer {
+  const names = labels.map((label) => ({ at: label.map_from_middle, text: label.label }));
   return {
     draw(drawing) {
       for (const label of labels) {
         const { x, y } = label.map_from_middle;
         if (!drawing.isInView(label.map_from_middle, label.map_from_middle)) continue;
         drawDisc(drawing, { x, y }, LABEL_COLORS[label.label] ?? "#888888", 5.5);
-        if (drawing.camera.scale > 14) drawText(drawing, { x, y }, label.label, 9);
       }
+      if (drawing.camera.scale > 14) drawNames(drawing, names, 9, false);
     },
     pick(point, radius_m) {
       const near = labels.map((label) => ({ label, distance_m: Math.hypot(label.map_from_middle.x - point.x, label.map_from_middle.y - point.y) }));
@@ -253,6 +254,23 @@ export function drawText(drawing: Drawing, at: Point, text: string, offset = 0, 
   context.fillText(text, drawing.px(at.x) + offset, drawing.py(at.y));
 }
 
+/** Texts at points, the most telling first; one that would lie on another is left out. */
+export function drawNames(drawing: Drawing, names: readonly { at: Point; text: string }[], offset: number, isCentered: boolean): void {
+  const taken: { left: number; right: number; y: number }[] = [];
+  for (const { at, text } of names) {
+    if (!drawing.isInView(at, at)) continue;
+    const width = text.length * NAME_LETTER_PX;
+    const left = drawing.px(at.x) + offset - (isCentered ? width / 2 : 0);
+    const box = { left, right: left + width, y: drawing.py(at.y) };
+    if (taken.some((other) => Math.abs(other.y - box.y) < NAME_LINE_PX && other.left < box.right && box.left < other.right)) continue;
+    taken.push(box);
+    drawText(drawing, at, text, offset, isCentered);
+  }
+}
+
+const NAME_LETTER_PX = 7;
+const NAME_LINE_PX = 15;
+
 /** An area with a name. */
 export interface Area {
   name: string;
@@ -266,6 +284,13 @@ export interface Area {
 }
 
 export function areasLayer(areas: Area[]): Layer {
+  const extent = ({ outline }: Area) => {
+    const bounds = new Bounds();
+    for (const { x, y } of outline) bounds.add(x, y);
+    return (bounds.high.x - bounds.low.x) * (bounds.high.y - bounds.low.y);
+  };
+  const bySize = areas.map((area) => ({ area, size: extent(area) })).sort((a, b) => b.size - a.size);
+  const names = bySize.map(({ area }) => ({ at: area.center, text: area.name }));
   return {
     draw(drawing) {
       const { context } = drawing;
@@ -283,7 +308,7 @@ export function areasLayer(areas: Area[]): Layer {
         context.lineWidth = 1.5;
         context.stroke();
       }
-      if (drawing.camera.scale > 8) for (const area of areas) drawText(drawing, area.center, area.name, 0, true);
+      if (drawing.camera.scale > 8) drawNames(drawing, names, 0, true);
     },
     pick(point, radius_m) {
       const area = areas.find(({ outline, holes }) => isInside(point, outline) && !holes.some((hole) => isInside(point, hole)));

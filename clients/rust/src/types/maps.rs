@@ -32,13 +32,16 @@ pub struct Component {
     pub runs: Vec<String>,
 }
 
-/// A run in the map.
+/// A run in the map; one that was cut is several, piece after piece.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapRun {
     /// Its name.
     pub run: String,
     /// The component whose frame the poses are in.
     pub component: u32,
+    /// Sequence number of its first scan: 0 but for later pieces of a run that was cut.
+    #[serde(default)]
+    pub first_scan: u64,
     /// Scans it had when the map was built.
     pub num_scans: u64,
     /// Metres driven.

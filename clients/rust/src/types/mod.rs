@@ -32,7 +32,7 @@ pub use matches::{
     Channel, DecisionKind, Evidence, Interval, Match, MatchState, Registration, RejectionReason,
 };
 pub use rooms::{Annotation, Door, NewAnnotation, Room, RoomLabel, Shape};
-pub use runs::{Geometry, NewRun, Receipt, Run, RunState, Scan, StoredScan};
+pub use runs::{CutReason, Geometry, NewRun, Receipt, Run, RunPiece, RunState, Scan, StoredScan};
 pub use sites::{ChangedSite, Retention, Site, SiteChange, SiteState, SiteSummary};
 pub use texts::{
     Frame, Observation, StampedPose, Trajectory, Word, WordAnswer, WordId, WordPattern, WordQuery,

@@ -36,6 +36,37 @@ pub enum RunState {
     Finished,
 }
 
+/// Why a piece of a run does not go on from the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CutReason {
+    /// Odometry stepped farther than a robot can, and the scans do not fit what was seen before.
+    Jump,
+    /// Nothing was recorded for a while, and what was seen then does not fit what was seen before.
+    Gap,
+    /// The laser saw nothing for a while, and what it saw then does not fit what it saw before.
+    NoReturns,
+    /// By its odometry the robot hardly moved, but it saw through what had been there: it was carried.
+    Carried,
+    /// There is no odometry to be believed, and the scans changed faster than they could be followed.
+    Unfollowed,
+}
+
+/// A piece of a run: nothing tells how it lies to the piece before but the map, if that joined them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunPiece {
+    /// Sequence number of its first scan.
+    pub from_scan: u64,
+    /// Sequence number of its last scan.
+    pub to_scan: u64,
+    /// Why it does not go on from the piece before; none of the first.
+    pub reason: Option<CutReason>,
+    /// The component of the map that it lies in; none when it is in no map.
+    pub component: Option<u32>,
+    /// Metres driven in the map; none when it is in no map.
+    pub length_m: Option<f64>,
+}
+
 /// A run and how far it has come.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Run {

@@ -74,8 +74,9 @@ pub struct ExampleInfo {
     pub map_version: u64,
     /// Metres that it drives.
     pub travel_m: f64,
-    /// The runs of the map, by their number.
-    pub runs: Vec<String>,
+    /// The runs of the map, or their pieces, by the number that the answer calls them, with the number of the first
+    /// observation.
+    pub runs: Vec<(String, u64)>,
     /// What is said of the recording.
     pub answer: ExampleAnswer,
 }
@@ -118,7 +119,7 @@ impl App {
                 site: site.name().to_string(),
                 map_version: map.record.version,
                 travel_m,
-                runs: map.record.runs.iter().map(|run| run.name.clone()).collect(),
+                runs: map.record.runs.iter().map(|run| (run.name.clone(), run.first_observation)).collect(),
                 answer: ExampleAnswer::default(),
             });
         }
@@ -189,7 +190,7 @@ async fn add_drive(
     mut builder: PlaceIndexBuilder,
 ) -> Result<PlaceIndexBuilder, AppError> {
     let run = map.reader().run(map_run.run).await?;
-    let observations = run.observations(0, map_run.num_labels as usize).await?;
+    let observations = run.observations(map_run.first_observation, map_run.num_labels as usize).await?;
     let trajectory = map.trajectory(map_run).await?;
     let component = map_run.component;
     on_blocking_thread(move || {

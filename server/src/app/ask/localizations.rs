@@ -79,14 +79,15 @@ struct Session {
 struct Search {
     session: SiteSession,
     next_sequence: u64,
-    latest_odom: Option<Pose2>,
+    /// Time and odometry of the scan before.
+    latest: Option<(i64, Pose2)>,
 }
 
 impl Search {
     fn push(&mut self, scans: &[Scan]) {
         scans.iter().for_each(|scan| self.session.push(scan));
         self.next_sequence += scans.len() as u64;
-        self.latest_odom = scans.last().map(|scan| scan.odom_from_robot).or(self.latest_odom);
+        self.latest = scans.last().map(|scan| (scan.timestamp_ns, scan.odom_from_robot)).or(self.latest);
     }
 }
 
@@ -168,12 +169,8 @@ impl App {
         }
         let num_known = (expected_sequence - batch.first_sequence) as usize;
         let step_max_m = self.config().limits.odometry_step_max_m;
-        let scans = batch.checked(
-            (&session.geometry, &session.readings),
-            num_known,
-            search.latest_odom,
-            step_max_m,
-        )?;
+        let scans =
+            batch.checked((&session.geometry, &session.readings), num_known, search.latest, step_max_m)?;
         let mut feeding = search.clone();
         *search = on_blocking_thread(move || {
             feeding.push(&scans);
@@ -247,7 +244,7 @@ impl App {
         let config = Arc::new(site.state().config.session());
         let session_map = SessionMap { components, index: self.place_index(site, map).await? };
         let session = SiteSession::new(geometry.clone(), config, session_map, prior);
-        Ok(Search { session, next_sequence: 0, latest_odom: None })
+        Ok(Search { session, next_sequence: 0, latest: None })
     }
 
     /// A component with the fields that localisation looks things up in.

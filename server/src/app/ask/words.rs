@@ -68,12 +68,9 @@ pub async fn find_words(
 
 /// Where an observation of a run was made in the map, as far as the map knows the run.
 async fn place(map: &Map, run: RunIdx, observation: u64) -> Result<Option<(u32, Pose2)>, AppError> {
-    let Some(map_run) = map.record.run(run) else { return Ok(None) };
     let observations = map.reader().run(run).await?.observations(observation, 1).await?;
-    let known = observations.first().filter(|observation| observation.scan_seq < map_run.num_scans);
-    let Some(observation) = known else { return Ok(None) };
-    let pose = map.trajectory(map_run).await?.at(observation.scan_seq, &observation.run_from_robot);
-    Ok(pose.map(|pose| (map_run.component, pose)))
+    let Some(observation) = observations.first() else { return Ok(None) };
+    Ok(map.places_of(run).await?.at(observation.scan_seq, &observation.run_from_robot))
 }
 
 /// The best fits in all texts, with the numbers of their runs in the site, best first, then by run and place.

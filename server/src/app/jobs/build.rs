@@ -1,7 +1,6 @@
 //! Building the map of a site in the background: load a snapshot, let the engine map it, write a version, serve it.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
@@ -9,14 +8,14 @@ use std::time::{Duration, Instant};
 use locution_engine::config::EngineConfig;
 use locution_engine::geometry::Pose2;
 use locution_engine::mapping::{
-    Channel, Decision, Evidence, Interval, Keyframe, MapStage, MapStep, MappedRun, MappingError, MatchState,
-    PlaceMatch, RejectionReason, RunRecord, SiteMap, Watch, map_site_watched, place_observations,
-    weigh_texts,
+    Channel, Decision, Evidence, Interval, Keyframe, MappedRun, MatchState, Piece, PlaceMatch,
+    RejectionReason, RunRecord, SiteMap, SitePieces, place_observations,
 };
 use locution_engine::semantics::{MapLabels, MapRooms, RoomsBefore};
 use locution_engine::text::{Observation, Word};
 use sha2::{Digest as _, Sha256};
 
+use super::founded::{MadeFrom, founded_map};
 use crate::app::maps::{
     MapDraft, WrittenRun, drop_versions, keep_annotations, note_made_of, rooms_before, serve_map,
 };
@@ -33,6 +32,7 @@ struct LoadedRun {
     observations: Vec<Observation>,
     words: Vec<Word>,
     keyframes: Vec<Keyframe>,
+    cuts: Vec<u64>,
 }
 
 impl LoadedRun {
@@ -40,7 +40,8 @@ impl LoadedRun {
         let observations = run.all_observations().await?;
         let words = run.words_after(&[]).await?;
         let keyframes = run.keyframes().await?;
-        Ok(Self { run, observations, words, keyframes })
+        let cuts = run.cuts().await?.iter().map(|cut| cut.scan_seq).collect();
+        Ok(Self { run, observations, words, keyframes, cuts })
     }
 
     fn as_record(&self) -> RunRecord<'_> {
@@ -89,9 +90,10 @@ impl App {
             progress.at(BuildStage::Reading, loaded.len() as f64 / num_runs as f64)?;
         }
         drop(snapshot);
-        let written: Vec<WrittenRun> = loaded.iter().map(written_run).collect();
+        let written = written_runs(&loaded);
+        let named: Vec<(RunIdx, u64)> = written.iter().map(|piece| (piece.run, piece.first_scan)).collect();
         let before = match &serving {
-            Some(serving) => rooms_before(serving).await?,
+            Some(serving) => rooms_before(serving, &named).await?,
             None => RoomsBefore::default(),
         };
         let made = map_runs(site, Arc::clone(&state.config), loaded, decisions, before, progress).await?;
@@ -115,13 +117,8 @@ impl App {
             .increment(record.num_verified.saturating_sub(num_before));
         metrics::histogram!("locution_build_seconds").record(started.elapsed().as_secs_f64());
         Ok(format!(
-            "map version {}: {} runs in {} components, {} of {} matches verified, {:.1} s",
-            record.version,
-            record.runs.len(),
-            record.num_components,
-            record.num_verified,
-            record.num_matches,
-            record.duration_s
+            "map version {}: {num_runs} runs in {} components, {} of {} matches verified, {:.1} s",
+            record.version, record.num_components, record.num_verified, record.num_matches, record.duration_s
         ))
     }
 
@@ -181,13 +178,28 @@ fn tell_of(site: &Site, map: &Map) {
     site.events().tell(SiteEvent::Matches { version, num_matches, num_verified });
 }
 
-fn written_run(run: &LoadedRun) -> WrittenRun {
-    WrittenRun {
-        run: run.run.idx,
-        name: run.run.record.name.clone(),
-        num_scans: run.run.head.next_sequence,
-        keyframe_seqs: run.keyframes.iter().map(|keyframe| keyframe.scan_seq).collect(),
-    }
+/// The pieces of all runs, as far as the map builder reads them.
+fn pieces_of(runs: &[LoadedRun]) -> SitePieces<'_> {
+    let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
+    let cuts: Vec<Vec<u64>> = runs.iter().map(|run| run.cuts.clone()).collect();
+    SitePieces::new(&records, &cuts)
+}
+
+fn written_runs(runs: &[LoadedRun]) -> Vec<WrittenRun> {
+    let written = |piece: &Piece<'_>| {
+        let LoadedRun { run, keyframes, .. } = &runs[piece.run_idx as usize];
+        let held = piece.keyframes.start as usize..piece.keyframes.end as usize;
+        WrittenRun {
+            run: run.idx,
+            name: run.record.name.clone(),
+            num_scans: piece.scans.end.min(run.head.next_sequence) - piece.scans.start,
+            first_scan: piece.scans.start,
+            first_observation: u64::from(piece.observations.start),
+            first_keyframe: u64::from(piece.keyframes.start),
+            keyframe_seqs: keyframes[held].iter().map(|keyframe| keyframe.scan_seq).collect(),
+        }
+    };
+    pieces_of(runs).pieces().iter().map(written).collect()
 }
 
 /// Numbers components anew, those of runs that drove first: component 0 is what is shown unless another is asked for, and
@@ -275,6 +287,17 @@ fn digest_of(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest 
     hasher.finalize().into()
 }
 
+/// The digest of everything that the first runs of a site amount to.
+fn digest_of_settled(site: &SiteRecord, runs: &[Run], decisions: &[Decision]) -> Digest {
+    let is_within = |decision: &&Decision| {
+        let runs_of_it = [decision.earlier.run_idx, decision.later.run_idx];
+        // A confirmation settles a match, wherever it is; a veto shapes the map.
+        !decision.is_same_place && runs_of_it.iter().all(|run| (*run as usize) < runs.len())
+    };
+    let within: Vec<Decision> = decisions.iter().filter(is_within).copied().collect();
+    digest_of(site, runs, &within)
+}
+
 /// The engine's part, with what the builds before have already registered.
 async fn map_runs(
     site: &Arc<Site>,
@@ -285,41 +308,43 @@ async fn map_runs(
     progress: &Arc<Progress>,
 ) -> Result<MadeMap, AppError> {
     if runs.iter().all(|run| run.keyframes.is_empty()) {
+        let num_pieces = runs.iter().map(|run| run.cuts.len() + 1).sum();
         let nowhere = MappedRun::default();
-        let map = SiteMap { runs: vec![nowhere; runs.len()], ..SiteMap::default() };
-        let labels = MapLabels { labels: vec![Vec::new(); runs.len()], places: Vec::new() };
+        let map = SiteMap { runs: vec![nowhere; num_pieces], ..SiteMap::default() };
+        let labels = MapLabels { labels: vec![Vec::new(); num_pieces], places: Vec::new() };
         let rooms = MapRooms { next_id: before.rooms.next_id, ..MapRooms::default() };
         return Ok(MadeMap { map, labels, match_places: Vec::new(), rooms });
     }
-    let mut memo = site.registrations.take(site.store()).await?;
+    let mut memory = site.remembered.take(site.store()).await?;
     let (progress, site) = (Arc::clone(progress), Arc::clone(site));
+    let site_record = site.state().record.clone();
     on_blocking_thread(move || {
-        let told = |step: MapStep| {
-            let stage = match step.stage {
-                MapStage::Settling => BuildStage::Settling,
-                MapStage::Joining => BuildStage::Joining,
-            };
-            match progress.at(stage, step.share) {
-                Ok(()) => ControlFlow::Continue(()),
-                Err(_) => ControlFlow::Break(()),
-            }
+        let pieces = pieces_of(&runs);
+        let records = pieces.records();
+        let told_of_pieces = pieces.decisions(&decisions);
+        let stored: Vec<Run> = runs.iter().map(|run| run.run.clone()).collect();
+        let settled_digest = |num_pieces: usize| {
+            let num_runs = pieces.pieces()[..num_pieces].last().map_or(0, |last| last.run_idx as usize + 1);
+            digest_of_settled(&site_record, &stored[..num_runs], &decisions)
         };
-        let records: Vec<RunRecord<'_>> = runs.iter().map(LoadedRun::as_record).collect();
-        let outcome = map_site_watched(&config.mapping, &records, &decisions, &mut memo, Watch::new(&told));
+        let from = MadeFrom {
+            config: &config,
+            runs: &records,
+            decisions: &told_of_pieces,
+            settled_digest: &settled_digest,
+        };
+        let outcome = founded_map(&mut memory, &from, &progress);
         // Also when the job was given up meanwhile: whoever goes on takes it up.
-        site.registrations.give_back(memo);
-        let mut map = outcome.map_err(|error| match error {
-            MappingError::Stopped => AppError::Stopping,
-            MappingError::Graph(error) => AppError::internal(error),
-        })?;
+        site.remembered.give_back(memory);
+        let mut map = outcome?;
         progress.at(BuildStage::Weighing, 0.0)?;
         number_driven_first(&records, &mut map);
-        weigh_texts(&records, &mut map, &config.matching);
         map.matches.append(&mut map.refused);
-        keep_vetoed_visible(&mut map, &decisions);
+        keep_vetoed_visible(&mut map, &told_of_pieces);
         progress.at(BuildStage::Weighing, 0.5)?;
         let labels = MapLabels::of(&records, &map, &config.semantics);
         let match_places = match_places(&records, &map);
+        pieces.tell_of_runs(&mut map);
         let rooms = MapRooms::of(&records, &map, &config.semantics.rooms, &before);
         Ok(MadeMap { map, labels, match_places, rooms })
     })

@@ -196,9 +196,9 @@ async fn end_job(
     }
     // Of a deleted site nothing can be stored, and need not be.
     if outcome.is_ok()
-        && let Err(error) = site.registrations.store(site.store()).await
+        && let Err(error) = site.remembered.store(site.store()).await
     {
-        tracing::warn!(site = %site.name(), %error, "what was registered is computed again after the next start");
+        tracing::warn!(site = %site.name(), %error, "what was mapped is computed again after the next start");
     }
     Err(AppError::Stopping)
 }

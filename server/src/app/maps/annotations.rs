@@ -187,7 +187,8 @@ async fn keyframes_of(map: &Map, component: u32) -> Result<Vec<Anchor>, AppError
 /// Poses of the keyframes of a map, read once for each run.
 struct Poses<'a> {
     map: &'a Map,
-    runs: BTreeMap<RunIdx, (u32, Vec<MapPose>)>,
+    /// The component of every pose beside it.
+    runs: BTreeMap<RunIdx, Vec<(u32, MapPose)>>,
 }
 
 impl<'a> Poses<'a> {
@@ -200,15 +201,21 @@ impl<'a> Poses<'a> {
         let mut by_component: BTreeMap<u32, Vec<MovedPose>> = BTreeMap::new();
         let runs: BTreeSet<RunIdx> = annotation.anchors.iter().map(|anchor| anchor.run_idx).collect();
         for run_idx in runs {
-            if let (None, Some(run)) = (self.runs.get(&run_idx), self.map.record.run(run_idx)) {
-                self.runs.insert(run_idx, (run.component, self.map.poses(run).await?));
+            if self.runs.contains_key(&run_idx) {
+                continue;
             }
+            let mut poses = Vec::new();
+            for piece in self.map.record.pieces_of(run_idx) {
+                poses.extend(self.map.poses(piece).await?.into_iter().map(|pose| (piece.component, pose)));
+            }
+            self.runs.insert(run_idx, poses);
         }
         for anchor in &annotation.anchors {
-            let Some((component, poses)) = self.runs.get(&anchor.run_idx) else { continue };
-            if let Ok(idx) = poses.binary_search_by_key(&anchor.scan_seq, |pose| pose.scan_seq) {
-                let moved = MovedPose { from: anchor.map_from_robot, to: poses[idx].map_from_robot };
-                by_component.entry(*component).or_default().push(moved);
+            let Some(poses) = self.runs.get(&anchor.run_idx) else { continue };
+            if let Ok(idx) = poses.binary_search_by_key(&anchor.scan_seq, |(_, pose)| pose.scan_seq) {
+                let (component, pose) = poses[idx];
+                let moved = MovedPose { from: anchor.map_from_robot, to: pose.map_from_robot };
+                by_component.entry(component).or_default().push(moved);
             }
         }
         let most = by_component.into_iter().rev().max_by_key(|(_, moved)| moved.len());

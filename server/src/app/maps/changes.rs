@@ -41,11 +41,15 @@ impl Sessions {
     ) -> Result<Self, NoSessions> {
         let placed = || map.runs.iter().filter(|run| run.num_poses > 0);
         let named = |names: &[String]| -> Result<Vec<MapRun>, NoSessions> {
-            let find = |name: &String| {
-                let found = placed().find(|run| run.name == *name);
-                found.cloned().ok_or_else(|| NoSessions::UnknownRun(name.clone()))
-            };
-            names.iter().map(find).collect()
+            let mut named = Vec::new();
+            for name in names {
+                let found: Vec<MapRun> = placed().filter(|run| run.name == *name).cloned().collect();
+                if found.is_empty() {
+                    return Err(NoSessions::UnknownRun(name.clone()));
+                }
+                named.extend(found);
+            }
+            Ok(named)
         };
         let after = match after {
             Some(names) => named(names)?,
@@ -108,15 +112,15 @@ struct LoadedRun {
 impl LoadedRun {
     async fn load(map: &Map, map_run: &MapRun) -> Result<Self, AppError> {
         let run = map.reader().run(map_run.run).await?;
-        let mut keyframes = run.keyframes().await?;
         let poses: Vec<Pose2> = map.poses(map_run).await?.iter().map(|pose| pose.map_from_robot).collect();
-        // What was sent after the map was built has no place in it.
-        keyframes.truncate(poses.len());
+        // Other pieces lie elsewhere, and what was sent after the map was built has no place in it.
+        let of_piece = run.keyframes().await?.into_iter().skip(map_run.first_keyframe as usize);
+        let keyframes = of_piece.take(poses.len()).collect();
         let observations = run.all_observations().await?;
         let trajectory = map.trajectory(map_run).await?;
         let densities = observations
             .iter()
-            .filter(|observation| observation.scan_seq < map_run.num_scans)
+            .filter(|observation| map_run.scans().contains(&observation.scan_seq))
             .filter_map(|observation| {
                 let pose = trajectory.at(observation.scan_seq, &observation.run_from_robot)?;
                 Some((pose.position(), *observation.densities.first()?))
@@ -201,6 +205,9 @@ mod tests {
             num_labels: 0,
             num_scans: 9,
             length_m: 1.0,
+            first_scan: 0,
+            first_observation: 0,
+            first_keyframe: 0,
         };
         MapRecord {
             version: 1,

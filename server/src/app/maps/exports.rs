@@ -8,7 +8,7 @@ use locution_engine::occupancy::{CellState, GridMap};
 use locution_engine::pose_graph::{InformationMatrix, PoseConstraint, PoseGraph};
 
 use super::matches::{MatchFilter, MatchOrder, matches};
-use crate::app::runs::{Frame, StampedPose, trajectory};
+use crate::app::runs::{StampedPose, trajectory_of};
 use crate::app::site::Site;
 use crate::app::{App, AppError, on_blocking_thread};
 use crate::picture::{Line, Panel, draw_png, draw_svg};
@@ -33,11 +33,12 @@ const GRAPH_HEAD: &str = "\
 pub async fn graph_as_g2o(map: &Map, component: u32) -> Result<String, AppError> {
     let runs = map.placed_runs(Some(component)).await?;
     let mut graph = PoseGraph::new();
-    let mut first_of_run = vec![None; map.record.runs.len()];
+    // For each run or piece of one which keyframes of the run are vertices, and the number of the first.
+    let mut vertices: Vec<(u32, std::ops::Range<u64>, u32)> = Vec::new();
     let mut text = GRAPH_HEAD.to_owned();
     for placed in &runs {
         let first = graph.poses().len() as u32;
-        first_of_run[placed.map_run.run as usize] = Some(first);
+        vertices.push((placed.map_run.run, placed.map_run.keyframes(), first));
         for (vertex, pose) in (first..).zip(&placed.poses) {
             graph.add_pose(pose.map_from_robot).map_err(AppError::internal)?;
             text += &format!("# {vertex} run {} scan {}\n", placed.map_run.name, pose.scan_seq);
@@ -51,9 +52,21 @@ pub async fn graph_as_g2o(map: &Map, component: u32) -> Result<String, AppError>
     let mut measured = BTreeSet::new();
     for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let found = numbered.found;
-        let firsts = [found.earlier.run_idx, found.later.run_idx].map(|run| first_of_run[run as usize]);
-        if let ([Some(earlier), Some(later)], Some(fit)) = (firsts, found.evidence.registration) {
-            let ends = (earlier + fit.earlier_keyframe, later + fit.later_keyframe);
+        let Some(fit) = found.evidence.registration else { continue };
+        let vertex = |run: u32, keyframe: u32| {
+            let keyframe = u64::from(keyframe);
+            let holds = |of: &&(u32, std::ops::Range<u64>, u32)| of.0 == run && of.1.contains(&keyframe);
+            vertices
+                .iter()
+                .find(holds)
+                .map(|(_, keyframes, first)| first + (keyframe - keyframes.start) as u32)
+        };
+        let ends = (
+            vertex(found.earlier.run_idx, fit.earlier_keyframe),
+            vertex(found.later.run_idx, fit.later_keyframe),
+        );
+        if let (Some(earlier), Some(later)) = ends {
+            let ends = (earlier, later);
             if !measured.insert(ends) {
                 continue;
             }
@@ -67,7 +80,8 @@ pub async fn graph_as_g2o(map: &Map, component: u32) -> Result<String, AppError>
 async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> Result<(), AppError> {
     let keyframes = placed.run.stored_keyframes().await?;
     let num_poses = placed.poses.len();
-    for (idx, two) in keyframes.windows(2).take(num_poses.saturating_sub(1)).enumerate() {
+    let of_piece = keyframes.get(placed.map_run.first_keyframe as usize..).unwrap_or_default();
+    for (idx, two) in of_piece.windows(2).take(num_poses.saturating_sub(1)).enumerate() {
         let motion = two[0].run_from_robot.between(&two[1].run_from_robot);
         let ends = (first + idx as u32, first + idx as u32 + 1);
         add_edge(graph, ends, motion, &two[1].motion_covariance);
@@ -75,21 +89,21 @@ async fn add_motions(graph: &mut PoseGraph, first: u32, placed: &PlacedRun) -> R
     Ok(())
 }
 
-/// Runs of a component, in their order, each with its pose at every scan.
+/// Runs of a component, in their order, each with its pose at every scan of those of its pieces that lie there.
 ///
 /// # Errors
 /// Those of the storage.
-pub async fn ways_of_runs(
-    site: &Site,
-    map: &Map,
-    component: u32,
-) -> Result<Vec<(String, Vec<StampedPose>)>, AppError> {
-    let mut ways = Vec::new();
+pub async fn ways_of_runs(map: &Map, component: u32) -> Result<Vec<(String, Vec<StampedPose>)>, AppError> {
+    let mut ways: Vec<(String, Vec<StampedPose>)> = Vec::new();
     for run in &map.record.runs {
         if run.num_poses > 0 && component == run.component {
             let stored = map.reader().run(run.run).await?;
-            let way = trajectory(site, &stored, Frame::Map, Some(map.record.version)).await?;
-            ways.push((run.name.clone(), way.poses));
+            let way = trajectory_of(map, run, &stored).await?;
+            match ways.last_mut() {
+                // Another piece of the same run.
+                Some((name, poses)) if *name == run.name => poses.extend(way),
+                _ => ways.push((run.name.clone(), way)),
+            }
         }
     }
     Ok(ways)
@@ -176,8 +190,13 @@ async fn lines_of(map: &Map, component: u32) -> Result<Vec<Line>, AppError> {
     for numbered in matches(map, &MatchFilter::verified(), MatchOrder::Number, 0, usize::MAX).await?.0 {
         let Some(fit) = numbered.found.evidence.registration else { continue };
         let end = |run: u32, keyframe: u32| -> Option<Point2> {
-            let placed = runs.iter().find(|placed| placed.map_run.run == run)?;
-            Some(placed.poses.get(keyframe as usize)?.map_from_robot.position())
+            let keyframe = u64::from(keyframe);
+            let is_held = |placed: &&PlacedRun| {
+                placed.map_run.run == run && placed.map_run.keyframes().contains(&keyframe)
+            };
+            let placed = runs.iter().find(is_held)?;
+            let idx = (keyframe - placed.map_run.first_keyframe) as usize;
+            Some(placed.poses.get(idx)?.map_from_robot.position())
         };
         let ends = (
             end(numbered.found.earlier.run_idx, fit.earlier_keyframe),

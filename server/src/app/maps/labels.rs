@@ -72,6 +72,7 @@ async fn stretches_of(map: &Map, map_run: &MapRun) -> Result<Vec<LabeledStretch>
         Ok((label.ok_or_else(unknown)?, stored.confidence))
     };
     let labels = map.labels(map_run).await?.iter().map(label).collect::<Result<Vec<_>, StorageError>>()?;
-    let observations = map.reader().run(map_run.run).await?.observations(0, labels.len()).await?;
+    let run = map.reader().run(map_run.run).await?;
+    let observations = run.observations(map_run.first_observation, labels.len()).await?;
     Ok(labeled_stretches(&labels, &observations, &map.trajectory(map_run).await?))
 }

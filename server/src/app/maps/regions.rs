@@ -73,9 +73,9 @@ async fn regions_of(placed: &PlacedRun) -> Result<Vec<Region>, AppError> {
             continue;
         };
         let middle = &stretch[stretch.len() / 2];
-        // The run may have gone on since the map was built.
-        if middle.scan_seq >= placed.map_run.num_scans {
-            break;
+        // The run may have gone on since the map was built, and other pieces of it lie elsewhere.
+        if !placed.map_run.scans().contains(&middle.scan_seq) {
+            continue;
         }
         let Some(map_from_middle) = trajectory.at(middle.scan_seq, &middle.run_from_robot) else { break };
         regions.push(Region {

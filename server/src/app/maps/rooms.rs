@@ -6,7 +6,7 @@ use locution_engine::semantics::{MapRooms, RoomsBefore};
 
 use super::annotations::annotations;
 use crate::app::AppError;
-use crate::records::Map;
+use crate::records::{Map, RunIdx};
 
 /// Annotations of this kind name the room in which they lie.
 const ROOM_KIND: &str = "room";
@@ -38,15 +38,22 @@ pub async fn names_of_rooms(map: &Map) -> Result<BTreeMap<u64, String>, AppError
     Ok(names)
 }
 
-/// What the next version needs of this one so that rooms keep their ids.
+/// What the next version, which is made of these pieces of runs, needs of this one so that rooms keep their ids: a
+/// piece is told by its run and its first scan.
 ///
 /// # Errors
 /// Those of the storage.
-pub async fn rooms_before(map: &Map) -> Result<RoomsBefore, AppError> {
+pub async fn rooms_before(map: &Map, pieces: &[(RunIdx, u64)]) -> Result<RoomsBefore, AppError> {
     let mut runs = Vec::new();
-    for run in &map.record.runs {
-        let poses = map.poses(run).await?;
-        runs.push((run.component, poses.iter().map(|pose| (pose.scan_seq, pose.map_from_robot)).collect()));
+    for (run, first_scan) in pieces {
+        let known =
+            (map.record.runs.iter().rev()).find(|old| old.run == *run && old.first_scan <= *first_scan);
+        let Some(known) = known else {
+            runs.push((0, Vec::new()));
+            continue;
+        };
+        let poses = map.poses(known).await?;
+        runs.push((known.component, poses.iter().map(|pose| (pose.scan_seq, pose.map_from_robot)).collect()));
     }
     Ok(RoomsBefore { rooms: map.rooms().await?.unwrap_or_default(), runs })
 }

@@ -16,12 +16,18 @@ use crate::storage::{Batch, SiteStore, StorageError};
 /// A commit is closed when its values take more than this.
 const COMMIT_BYTES_MAX: usize = 4 << 20;
 
-/// What a map version remembers of a run, besides what the engine made of it.
+/// What a map version remembers of a run, or of a piece of one, besides what the engine made of it.
 pub struct WrittenRun {
     /// Its number in the site.
     pub run: RunIdx,
     pub name: String,
     pub num_scans: u64,
+    /// Sequence number of its first scan.
+    pub first_scan: u64,
+    /// Number of its first observation among those of the run.
+    pub first_observation: u64,
+    /// Number of its first keyframe among those of the run.
+    pub first_keyframe: u64,
     /// Sequence numbers of its keyframes.
     pub keyframe_seqs: Vec<u64>,
 }
@@ -79,6 +85,9 @@ impl MapDraft {
                 num_labels: labels.len() as u64,
                 num_scans: written.num_scans,
                 length_m: steps.sum(),
+                first_scan: written.first_scan,
+                first_observation: written.first_observation,
+                first_keyframe: written.first_keyframe,
             });
             first_pose += poses.len() as u64;
             first_label += labels.len() as u64;

@@ -17,7 +17,7 @@ use locution_engine::scan::{Scan, ScanGeometry};
 use crate::app::site::{RunChange, RunWriter, Site, SiteEvent, Translated, WriterState};
 use crate::app::{App, AppError, Name, on_blocking_thread};
 use crate::records::{
-    ReadingRules, Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans,
+    ReadingRules, Receipt, Run, RunHead, append_scans, find_receipt, is_same_scan, read_scans, read_stamps,
 };
 use crate::storage::Batch;
 
@@ -33,12 +33,12 @@ pub struct NewBatch {
 }
 
 impl NewBatch {
-    /// The scans after the first `num_known`, checked like those of a run whose last odometry was `before`.
+    /// The scans after the first `num_known`, checked like those of a run whose last scan was taken at `before`.
     pub fn checked(
         mut self,
         (geometry, readings): (&ScanGeometry, &ReadingRules),
         num_known: usize,
-        before: Option<Pose2>,
+        before: Option<(i64, Pose2)>,
         step_max_m: f64,
     ) -> Result<Vec<Scan>, AppError> {
         check_readings(&mut self.scans, geometry, readings)?;
@@ -139,8 +139,8 @@ impl App {
             return Err(AppError::Finished { run: writer.record.name.clone(), expected_sequence });
         }
         check_has_odometry(&batch, state.head.value.last_odom_from_robot)?;
-        let step_max_m = self.config().limits.odometry_step_max_m;
-        check_odometry(&batch.scans, num_repeated, state.head.value.last_odom_from_robot, step_max_m)?;
+        let before = last_stamp(site, writer, &state.head.value).await?;
+        check_odometry(&batch.scans, num_repeated, before, self.config().limits.odometry_step_max_m)?;
         let fresh = batch.scans.split_off(num_repeated);
         let interval = self.config().storage.num_scans_per_checkpoint;
         let receipt = append_fresh(site, writer, state, fresh, interval).await?;
@@ -213,24 +213,34 @@ fn check_has_odometry(batch: &NewBatch, before: Option<Pose2>) -> Result<(), App
     Ok(())
 }
 
-/// A robot that is elsewhere from one scan to the next has lost its odometry; no text can bridge that.
+/// No robot is faster, metres per second.
+const SPEED_MAX_M_PER_S: f64 = 3.0;
+/// Odometry that is reset begins this close to zero, metres.
+const RESET_MAX_M: f64 = 0.5;
+
+/// Odometry may jump, and the engine says whether the scans bear it out. But no robot is a building farther from one scan to
+/// the next: that is another recording, or damage. Odometry that begins at zero again is neither.
 fn check_odometry(
     scans: &[Scan],
     first_fresh: usize,
-    before: Option<Pose2>,
+    before: Option<(i64, Pose2)>,
     step_max_m: f64,
 ) -> Result<(), AppError> {
     let mut before = before;
     for (scan_idx, scan) in scans.iter().enumerate().skip(first_fresh) {
-        let step_m = before.map_or(0.0, |before| before.distance(&scan.odom_from_robot));
-        if step_m > step_max_m {
+        let here = scan.odom_from_robot;
+        let (step_m, gap_s) = before.map_or((0.0, 0.0), |(before_ns, before)| {
+            (before.distance(&here), scan.timestamp_ns.saturating_sub(before_ns) as f64 * 1e-9)
+        });
+        let step_max_m = step_max_m.max(SPEED_MAX_M_PER_S * gap_s);
+        if step_m > step_max_m && here.x.hypot(here.y) > RESET_MAX_M {
             let problem = format!(
-                "scan {scan_idx} lies {step_m:.1} m from the scan before it, more than the {step_max_m} m a robot \
-                 moves between scans; start a new run after a jump of the odometry"
+                "scan {scan_idx} lies {step_m:.1} m from the scan before it, more than the {step_max_m:.0} m a robot \
+                 moves meanwhile; start a new run after a jump of the odometry"
             );
             return Err(AppError::invalid_scan(format!("scans[{scan_idx}].odom_from_robot"), problem));
         }
-        before = Some(scan.odom_from_robot);
+        before = Some((scan.timestamp_ns, here));
     }
     Ok(())
 }
@@ -257,6 +267,16 @@ async fn repeated_scans(
         }
         None => Ok(stored.len()),
     }
+}
+
+/// Time and odometry of the last scan that is stored.
+async fn last_stamp(
+    site: &Site,
+    writer: &RunWriter,
+    head: &RunHead,
+) -> Result<Option<(i64, Pose2)>, AppError> {
+    let Some(last) = head.next_sequence.checked_sub(1) else { return Ok(None) };
+    Ok(read_stamps(site.store(), writer.idx, last..head.next_sequence).await?.pop())
 }
 
 /// The answer to a batch that is stored: the one it got then, or where the run stands when it was cut differently.

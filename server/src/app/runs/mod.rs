@@ -5,6 +5,7 @@ mod ingest;
 mod make;
 mod open_runs;
 mod part;
+mod pieces;
 mod trajectory;
 
 pub(in crate::app) use delete::{end_deletions, pending_deletions};
@@ -12,4 +13,5 @@ pub use ingest::NewBatch;
 pub use make::NewRun;
 pub use open_runs::OpenRuns;
 pub use part::{FrameOf, observations_in, scans_in};
-pub use trajectory::{Frame, StampedPose, Trajectory, trajectory};
+pub use pieces::{RunPiece, pieces};
+pub use trajectory::{Frame, StampedPose, Trajectory, trajectory, trajectory_of};

@@ -5,14 +5,13 @@
 use std::ops::Range;
 
 use locution_engine::geometry::Pose2;
-use locution_engine::recording::RunTrajectory;
 use locution_engine::scan::Scan;
 use locution_engine::text::Observation;
 
 use super::trajectory::{Frame, trajectory};
 use crate::app::site::Site;
 use crate::app::{AppError, Window};
-use crate::records::{MapVersion, Run};
+use crate::records::{MapVersion, Run, RunPlaces};
 
 /// Observations read at once.
 const NUM_OBSERVATIONS_PER_STEP: usize = 2_000;
@@ -45,7 +44,7 @@ pub async fn scans_in(
         let end = from + scans.len() as u64;
         return Ok(((from..).zip(scans).collect(), (end < run.head.next_sequence).then_some(end)));
     }
-    let poses = trajectory(site, run, of.frame, of.version).await?.poses;
+    let poses = trajectory(site, run, of.frame, of.version, None).await?.poses;
     let wanted = poses.iter().filter(|pose| {
         pose.scan_seq >= from && window.holds(pose.timestamp_ns, &pose.frame_from_robot.position())
     });
@@ -83,7 +82,7 @@ pub async fn observations_in(
         match (&in_map, of.frame) {
             (Some(trajectory), _) => {
                 let own = observation.run_from_robot;
-                trajectory.at(observation.scan_seq, &own).unwrap_or(own)
+                trajectory.at(observation.scan_seq, &own).map_or(own, |(_, pose)| pose)
             }
             (None, Frame::Odom) => observation.odom_from_robot,
             (None, _) => observation.run_from_robot,
@@ -107,14 +106,12 @@ pub async fn observations_in(
     Ok((found, None))
 }
 
-async fn map_trajectory(
-    site: &Site,
-    run: &Run,
-    version: Option<MapVersion>,
-) -> Result<RunTrajectory, AppError> {
+async fn map_trajectory(site: &Site, run: &Run, version: Option<MapVersion>) -> Result<RunPlaces, AppError> {
     let map = site.map(version).await?;
-    let in_map = map.record.run(run.idx).ok_or_else(|| super::trajectory::not_in(run, &map.record))?;
-    Ok(map.trajectory(in_map).await?)
+    if map.record.pieces_of(run.idx).next().is_none() {
+        return Err(super::trajectory::not_in(run, &map.record));
+    }
+    Ok(map.places_of(run.idx).await?)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@
 mod events;
 mod jobs;
 mod progress;
-mod registrations;
+mod remembered;
 mod run_writer;
 mod state;
 mod text_budget;
@@ -31,7 +31,7 @@ use crate::storage::{Batch, Precondition, SiteStore, StorageError};
 pub use events::{EventId, Events, RunChange, SiteEvent, Watched};
 pub use jobs::{JobInfo, Jobs};
 pub use progress::{BuildStage, Ending, Progress};
-pub use registrations::Registrations;
+pub use remembered::{BuildMemory, Remembered};
 pub use run_writer::{RunWriter, WriterState};
 pub use state::{SiteState, TextConfig};
 pub use text_budget::TextBudget;
@@ -54,7 +54,7 @@ pub struct Site {
     events: Arc<Events>,
     pub(in crate::app) build_requests: AtomicU64,
     /// Registrations that earlier builds computed.
-    pub(in crate::app) registrations: Registrations,
+    pub(in crate::app) remembered: Remembered,
     texts: Arc<SiteTexts>,
     text_budget: Arc<TextBudget>,
     /// Set when the site is deleted or the server ends: jobs give way.
@@ -110,7 +110,7 @@ impl Site {
             making_runs: tokio::sync::Mutex::default(),
             serving: tokio::sync::RwLock::default(),
             build_requests: AtomicU64::new(0),
-            registrations: Registrations::default(),
+            remembered: Remembered::default(),
             texts: Arc::default(),
             text_budget,
             stop,

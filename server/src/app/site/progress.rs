@@ -117,6 +117,12 @@ struct Now {
 }
 
 impl Progress {
+    /// A job that nobody ends.
+    #[cfg(test)]
+    pub fn unwatched() -> Self {
+        Self::new(StageTimes::default(), CancellationToken::new())
+    }
+
     /// A job that has not begun; `times` are those of the build before.
     pub fn new(times: StageTimes, stopping: CancellationToken) -> Self {
         Self {

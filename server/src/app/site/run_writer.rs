@@ -177,6 +177,9 @@ impl WriterState {
             .collect();
         series::append(batch, &keyframes, text.num_keyframes, |n| Key::Keyframes(generation, run, n));
         text.num_keyframes += keyframes.len() as u64;
+        for cut in &translated.cuts {
+            batch.put(Key::Cut(generation, run, cut.scan_seq).encode(), codec::encode(&cut.reason));
+        }
     }
 
     /// Stores the translator when enough scans went by since it was last stored, or when asked to.

@@ -4,13 +4,13 @@ use locution_engine::config::EngineConfig;
 use locution_engine::sampling::KeyframePose;
 use locution_engine::scan::{Scan, ScanGeometry};
 use locution_engine::text::{Observation, Quantizer, Word};
-use locution_engine::translator::{Translation, Translator};
+use locution_engine::translator::{Cut, Translation, Translator};
 
 use crate::app::AppError;
 use crate::storage::StorageError;
 
 /// First byte of a stored translator. Before there was one the first byte said how odometry is treated, 0 or 1.
-const TRANSLATOR_LAYOUT: u8 = 2;
+const TRANSLATOR_LAYOUT: u8 = 3;
 
 /// What translating some scans brought.
 #[derive(Debug, Default)]
@@ -21,6 +21,8 @@ pub struct Translated {
     pub words: Vec<Word>,
     /// New keyframes, in order.
     pub keyframes: Vec<KeyframePose>,
+    /// Where the run falls in two, in order.
+    pub cuts: Vec<Cut>,
 }
 
 impl Translated {
@@ -28,6 +30,7 @@ impl Translated {
         self.observations.extend(translation.observations);
         self.words.extend(translation.words);
         self.keyframes.extend(translation.keyframe);
+        self.cuts.extend(translation.cut);
     }
 }
 

@@ -278,7 +278,10 @@ pub struct ExampleEvidenceDto {
 impl From<ExampleInfo> for ExampleAnswerDto {
     fn from(info: ExampleInfo) -> Self {
         let run = |place: &AnsweredPlace| info.runs.get(place.found.earlier.run_idx as usize).cloned();
-        let place = |place: AnsweredPlace| ExamplePlaceDto::new(run(&place).unwrap_or_default(), place);
+        let place = |place: AnsweredPlace| {
+            let (run, first) = run(&place).unwrap_or_default();
+            ExamplePlaceDto::new(run, first as u32, place)
+        };
         Self {
             site: info.site,
             map_version: info.map_version,
@@ -291,7 +294,7 @@ impl From<ExampleInfo> for ExampleAnswerDto {
 }
 
 impl ExamplePlaceDto {
-    fn new(run: String, place: AnsweredPlace) -> Self {
+    fn new(run: String, first: u32, place: AnsweredPlace) -> Self {
         let AnsweredPlace { found, probability } = place;
         Self {
             component: found.component,
@@ -299,7 +302,7 @@ impl ExamplePlaceDto {
             covariance: found.covariance.transpose().into(),
             probability,
             run,
-            observations: [found.earlier.first, found.earlier.last],
+            observations: [found.earlier.first, found.earlier.last].map(|idx| first + idx),
             direction: found.direction.into(),
             evidence: ExampleEvidenceDto {
                 channel: ChannelDto::Profile,

@@ -61,13 +61,16 @@ pub struct ComponentDto {
     pub runs: Vec<String>,
 }
 
-/// A run in the map.
+/// A run in the map; one that was cut is several, piece after piece.
 #[derive(Clone, Debug, Serialize, Deserialize, ToSchema)]
 pub struct MapRunDto {
     /// Its name.
     pub run: String,
     /// The component whose frame the poses are in.
     pub component: u32,
+    /// Sequence number of its first scan: 0 but for later pieces of a run that was cut.
+    #[serde(default)]
+    pub first_scan: u64,
     /// Scans it had when the map was built.
     pub num_scans: u64,
     /// Metres driven.
@@ -162,7 +165,10 @@ impl MapStatisticsDto {
 pub fn components_of(map: &MapRecord) -> Vec<ComponentDto> {
     let runs_of = |component: u32| {
         let is_in = move |run: &&MapRun| run.component == component && run.num_poses > 0;
-        map.runs.iter().filter(is_in).map(|run| run.name.clone()).collect::<Vec<_>>()
+        let mut names: Vec<String> = map.runs.iter().filter(is_in).map(|run| run.name.clone()).collect();
+        // Pieces of a run stand side by side.
+        names.dedup();
+        names
     };
     (0..map.num_components)
         .map(|component| ComponentDto { component, runs: runs_of(component) })
@@ -172,10 +178,9 @@ pub fn components_of(map: &MapRecord) -> Vec<ComponentDto> {
 
 /// A version on the wire.
 pub fn map_dto(map: &MapRecord, versions: Vec<u64>, runs: &[PlacedRun], topology: Topology) -> MapDto {
-    let name = |run: u32| map.runs.get(run as usize).map(|run| run.name.clone()).unwrap_or_default();
     let regions = topology.regions.iter().map(|region| RegionDto {
         component: region.component,
-        run: name(region.run),
+        run: map.name_of(region.run),
         word: region.word,
         class: region.class,
         length_m: region.length_m,
@@ -205,6 +210,7 @@ fn run_dto(placed: &PlacedRun) -> MapRunDto {
     MapRunDto {
         run: placed.map_run.name.clone(),
         component: placed.map_run.component,
+        first_scan: placed.map_run.first_scan,
         num_scans: placed.map_run.num_scans,
         length_m: placed.map_run.length_m,
         poses: placed.poses.iter().map(pose).collect(),

@@ -310,7 +310,7 @@ impl MatchDto {
         let found: &PlaceMatch = &numbered.found;
         let interval =
             |interval: &locution_engine::mapping::Interval, place: Option<StretchPlace>| IntervalDto {
-                run: map.runs.get(interval.run_idx as usize).map(|run| run.name.clone()).unwrap_or_default(),
+                run: map.name_of(interval.run_idx),
                 first: interval.first,
                 last: interval.last,
                 first_timestamp_ns: place.map(|place| place.timestamps_ns.0),

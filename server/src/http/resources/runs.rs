@@ -6,14 +6,16 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::StatusCode;
 use axum::response::{IntoResponse, Response};
+use locution_engine::registration::CutReason;
 use locution_engine::scan::ScanGeometry;
 use serde::{Deserialize, Serialize};
 use utoipa::ToSchema;
 
 use super::jobs::{JobDto, accepted};
-use crate::app::runs::NewRun;
+use crate::app::runs::{NewRun, RunPiece, pieces};
 use crate::error::ApiError;
 use crate::extract::{Body, NoParams, Paged, RunName, SiteOf};
+use crate::http::resources::maps::VersionParams;
 use crate::http::values::{Page, PageParams, PoseDto};
 use crate::http::with_location;
 use crate::records::{ReadingRules, Run};
@@ -267,6 +269,78 @@ pub async fn finish_run(
     RunName(name): RunName,
 ) -> Result<Json<RunDto>, ApiError> {
     Ok(Json(state.app.finish_run(site, &name).await?.into()))
+}
+
+/// Why a piece of a run does not go on from the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, ToSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CutReasonDto {
+    /// Odometry stepped farther than a robot can, and the scans do not fit what was seen before.
+    Jump,
+    /// Nothing was recorded for a while, and what was seen then does not fit what was seen before.
+    Gap,
+    /// The laser saw nothing for a while, and what it saw then does not fit what it saw before.
+    NoReturns,
+    /// By its odometry the robot hardly moved, but it saw through what had been there: it was carried.
+    Carried,
+    /// There is no odometry to be believed, and the scans changed faster than they could be followed.
+    Unfollowed,
+}
+
+impl From<CutReason> for CutReasonDto {
+    fn from(reason: CutReason) -> Self {
+        match reason {
+            CutReason::Jump => Self::Jump,
+            CutReason::Gap => Self::Gap,
+            CutReason::NoReturns => Self::NoReturns,
+            CutReason::Carried => Self::Carried,
+            CutReason::Unfollowed => Self::Unfollowed,
+        }
+    }
+}
+
+/// A piece of a run: nothing tells how it lies to the piece before but the map, if that joined them.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, ToSchema)]
+pub struct RunPieceDto {
+    /// Sequence number of its first scan.
+    pub from_scan: u64,
+    /// Sequence number of its last scan.
+    pub to_scan: u64,
+    /// Why it does not go on from the piece before; null for the first.
+    pub reason: Option<CutReasonDto>,
+    /// The component of the map that it lies in; pieces of one component share a frame. Null when it is in no map.
+    pub component: Option<u32>,
+    /// Metres driven in the map; null when it is in no map.
+    pub length_m: Option<f64>,
+}
+
+impl From<RunPiece> for RunPieceDto {
+    fn from(piece: RunPiece) -> Self {
+        Self {
+            from_scan: piece.from_scan,
+            to_scan: piece.to_scan,
+            reason: piece.reason.map(CutReasonDto::from),
+            component: piece.in_map.map(|(component, _)| component),
+            length_m: piece.in_map.map(|(_, length_m)| length_m),
+        }
+    }
+}
+
+/// The pieces that a run falls in where neither its odometry nor its scans tell how the robot got on: after a jump, a gap,
+/// when it was carried. A run that could be followed all the way is one piece.
+#[utoipa::path(get, path = "/v1/sites/{site}/runs/{run}/pieces", operation_id = "list_pieces", tag = "runs",
+    params(VersionParams, PageParams),
+    responses((status = 200, description = "A page of pieces, in order", body = Page<RunPieceDto>)))]
+pub async fn list_pieces(
+    SiteOf(site): SiteOf,
+    RunName(name): RunName,
+    Paged(params, page): Paged<VersionParams>,
+) -> Result<Json<Page<RunPieceDto>>, ApiError> {
+    let run = site.run(&name).await?;
+    let all = pieces(&site, &run, params.version).await?;
+    let num_all = all.len() as u64;
+    let of_page = all.into_iter().skip(usize::try_from(page.first).unwrap_or(usize::MAX)).take(page.limit);
+    Ok(Json(Page::of(of_page.map(RunPieceDto::from).collect(), page.first, num_all)))
 }
 
 /// Forget a run with all its traces. It is unknown and its scans and texts are gone at once; when there is a map, a build is

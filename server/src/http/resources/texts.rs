@@ -178,6 +178,9 @@ pub struct TrajectoryParams {
     /// Version of the map, when the frame is `map`; the serving one unless said.
     #[serde(default, deserialize_with = "crate::http::values::in_query")]
     pub version: Option<u64>,
+    /// In the frame `map` only the pieces of the run that lie in this component; unless said, in that of the first.
+    #[param(minimum = 0)]
+    pub component: Option<u32>,
     /// Not before, nanoseconds.
     pub from_ns: Option<i64>,
     /// Before, nanoseconds.
@@ -204,7 +207,7 @@ impl TrajectoryParams {
             return Err(ApiError::invalid("limit", "at least 1 pose"));
         }
         let window = window(self.from_ns, self.to_ns, self.area.as_deref())?;
-        let mut trajectory = trajectory(site, run, self.frame.into(), self.version).await?;
+        let mut trajectory = trajectory(site, run, self.frame.into(), self.version, self.component).await?;
         let first = self.cursor.unwrap_or(0);
         trajectory.poses.retain(|pose| {
             pose.scan_seq >= first && window.holds(pose.timestamp_ns, &pose.frame_from_robot.position())
@@ -242,7 +245,8 @@ impl From<&StampedPose> for StampedPoseDto {
 pub struct TrajectoryDto {
     /// Component of the map that the poses belong to; null outside the map frame.
     pub component: Option<u32>,
-    /// One for every scan that was asked for, in order.
+    /// One for every scan that was asked for, in order; of a run that was cut, in the map frame, for those of the pieces
+    /// that lie in the component.
     pub poses: Vec<StampedPoseDto>,
     /// Where the next ones begin, when fewer were wanted than there are; null at the end.
     pub next_cursor: Option<String>,

@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use locution_engine::config::EngineConfig;
-use locution_engine::mapping::{MatchState, RegistrationMemo, RunRecord, SiteMap, map_site, weigh_texts};
+use locution_engine::mapping::{
+    Extended, Foundation, MapSettings, MatchState, RegistrationMemo, RunRecord, SiteMap, Watch,
+};
 use serde::Serialize;
 
 use crate::Failure;
@@ -21,13 +23,14 @@ const FIRST_SEED: u64 = 500;
 #[derive(Clone, Debug, Serialize)]
 struct Grown {
     num_runs: usize,
-    /// Seconds of the build that adds the last run, of all cores together while it was made, and of weighing the texts
-    /// after it.
+    /// Seconds of the build that adds the last run, texts weighed, and of all cores together while it was made.
     seconds: f64,
     core_seconds: f64,
-    weighing_seconds: f64,
     resident_mib: f64,
     num_remembered: usize,
+    /// Runs that are settled, and keyframes that stand for them.
+    num_settled: usize,
+    num_kept: usize,
     num_components: u32,
     num_matches: usize,
     num_verified: usize,
@@ -45,50 +48,69 @@ struct ErrorM {
 /// Adds the runs of a world and its furnished twin in turns, then maps all of them from nothing.
 pub fn grow(num_runs: u64, world: &str) -> Result<(), Failure> {
     let mut runs: Vec<Driven> = Vec::new();
-    let mut memo = RegistrationMemo::default();
-    let mut latest = SiteMap::default();
+    let (mut site, mut latest) = (Site::default(), SiteMap::default());
     for run in 0..num_runs {
         let world = if run % 2 == 0 { world.to_owned() } else { format!("{world}-furniture") };
         let mut driven = Driven::wandering(&world, LENGTH_M, NUM_PEOPLE, FIRST_SEED + run)?;
         driven.place = "same".to_owned();
         runs.push(driven);
-        let (map, grown) = built(&runs, &mut memo)?;
+        let (map, grown) = site.built(&runs)?;
         println!("{}", serde_json::to_string(&grown)?);
         latest = map;
     }
-    let (at_once, grown) = built(&runs, &mut RegistrationMemo::default())?;
+    let (began, cores_before) = (Instant::now(), core_seconds());
+    let mut site = Site::default();
+    let mut at_once = SiteMap::default();
+    for end in (0..=runs.len()).filter(|end| end % GENERATION == 0 || *end == runs.len()).skip(1) {
+        at_once = site.built(&runs[..end])?.0;
+    }
     println!(
         "{num_runs} runs from nothing: {:.1} s, {:.1} s of all cores together, {} as run by run",
-        grown.seconds,
-        grown.core_seconds,
+        began.elapsed().as_secs_f64(),
+        core_seconds() - cores_before,
         if at_once == latest { "the same map" } else { "NOT the same map" }
     );
     Ok(())
 }
 
-fn built(runs: &[Driven], memo: &mut RegistrationMemo) -> Result<(SiteMap, Grown), Failure> {
-    let records: Vec<RunRecord<'_>> = runs.iter().map(Driven::record).collect();
-    let config = EngineConfig::default();
-    let (began, cores_before) = (Instant::now(), core_seconds());
-    let map = map_site(&config.mapping, &records, &[], memo)?;
-    let (seconds, core_seconds) = (began.elapsed().as_secs_f64(), core_seconds() - cores_before);
-    let mut weighed = map.clone();
-    weigh_texts(&records, &mut weighed, &config.matching);
-    let is_verified = |state: MatchState| state == MatchState::Verified;
-    let grown = Grown {
-        num_runs: runs.len(),
-        seconds,
-        core_seconds,
-        weighing_seconds: began.elapsed().as_secs_f64() - seconds,
-        resident_mib: resident_mib(),
-        num_remembered: memo.len(),
-        num_components: map.num_components,
-        num_matches: map.matches.len(),
-        num_verified: map.matches.iter().filter(|found| is_verified(found.state)).count(),
-        num_refused: map.refused.len(),
-        error_m: error_m(runs, &map),
-    };
-    Ok((map, grown))
+/// Runs of a generation, as the defaults have it.
+const GENERATION: usize = 10;
+
+/// What the builds of a site remember.
+#[derive(Default)]
+struct Site {
+    memo: RegistrationMemo,
+    foundation: Foundation,
+}
+
+impl Site {
+    /// Maps the runs, of which all but those of the last generation are settled.
+    fn built(&mut self, runs: &[Driven]) -> Result<(SiteMap, Grown), Failure> {
+        let config = EngineConfig::default();
+        let (began, cores_before) = (Instant::now(), core_seconds());
+        let records: Vec<RunRecord<'_>> =
+            runs[self.foundation.num_runs()..].iter().map(Driven::record).collect();
+        let settings = MapSettings { mapping: &config.mapping, matching: Some(&config.matching) };
+        let Extended { map, foundation } =
+            self.foundation.extended(settings, &records, &[], &mut self.memo, Watch::nobody())?;
+        self.foundation = foundation.unwrap_or_else(|| std::mem::take(&mut self.foundation));
+        let is_verified = |state: MatchState| state == MatchState::Verified;
+        let grown = Grown {
+            num_runs: runs.len(),
+            seconds: began.elapsed().as_secs_f64(),
+            core_seconds: core_seconds() - cores_before,
+            resident_mib: resident_mib(),
+            num_remembered: self.memo.len(),
+            num_settled: self.foundation.num_runs(),
+            num_kept: self.foundation.num_keyframes(),
+            num_components: map.num_components,
+            num_matches: map.matches.len(),
+            num_verified: map.matches.iter().filter(|found| is_verified(found.state)).count(),
+            num_refused: map.refused.len(),
+            error_m: error_m(runs, &map),
+        };
+        Ok((map, grown))
+    }
 }
 
 fn error_m(runs: &[Driven], map: &SiteMap) -> ErrorM {

@@ -40,6 +40,29 @@ pub struct LabelReport {
     pub labels: BTreeMap<String, LabelScore>,
 }
 
+impl LabelReport {
+    /// What follows from a confusion matrix.
+    pub fn of(confusion: BTreeMap<String, BTreeMap<String, usize>>) -> Self {
+        let labels = confusion
+            .keys()
+            .map(|label| {
+                let cell =
+                    |actual: &str| confusion.get(actual).and_then(|row| row.get(label)).copied().unwrap_or(0);
+                let num_right = cell(label);
+                let num_predicted: usize = confusion.keys().map(|actual| cell(actual)).sum();
+                let support: usize = confusion[label].values().sum();
+                let score = LabelScore {
+                    precision: share(num_right, num_predicted),
+                    recall: share(num_right, support),
+                    support,
+                };
+                (label.clone(), score)
+            })
+            .collect();
+        Self { confusion, labels }
+    }
+}
+
 /// Judges the observations of all runs; each run in order of travel.
 ///
 /// A prediction within a metre of a change of the true label is right if it names either side: the border may lie
@@ -57,23 +80,7 @@ pub fn judge_labels(runs: &[Vec<LabeledObservation<'_>>]) -> LabelReport {
             *row.entry(judged_as.to_owned()).or_default() += 1;
         }
     }
-    let labels = confusion
-        .keys()
-        .map(|label| {
-            let cell =
-                |actual: &str| confusion.get(actual).and_then(|row| row.get(label)).copied().unwrap_or(0);
-            let num_right = cell(label);
-            let num_predicted: usize = confusion.keys().map(|actual| cell(actual)).sum();
-            let support: usize = confusion[label].values().sum();
-            let score = LabelScore {
-                precision: share(num_right, num_predicted),
-                recall: share(num_right, support),
-                support,
-            };
-            (label.clone(), score)
-        })
-        .collect();
-    LabelReport { confusion, labels }
+    LabelReport::of(confusion)
 }
 
 /// Whether the label truly occurs within the tolerance of an observation, in driving before or after it.

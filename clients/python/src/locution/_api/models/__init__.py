@@ -17,6 +17,7 @@ from .collection_type import CollectionType
 from .component import Component
 from .connection import Connection
 from .connection_kind import ConnectionKind
+from .cut_reason import CutReason
 from .decision_body import Decision
 from .decision_kind import DecisionKind
 from .direction import Direction
@@ -121,6 +122,8 @@ from .route_turn import RouteTurn
 from .run import Run
 from .run_change import RunChange
 from .run_page import RunPage
+from .run_piece import RunPiece
+from .run_piece_page import RunPiecePage
 from .run_state import RunState
 from .scan import Scan
 from .scope import Scope
@@ -168,6 +171,7 @@ __all__ = (
     "Component",
     "Connection",
     "ConnectionKind",
+    "CutReason",
     "Decision",
     "DecisionKind",
     "Direction",
@@ -272,6 +276,8 @@ __all__ = (
     "Run",
     "RunChange",
     "RunPage",
+    "RunPiece",
+    "RunPiecePage",
     "RunState",
     "Scan",
     "Scope",

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from attrs import define as _attrs_define
 from attrs import field as _attrs_field
 
+from ..types import UNSET, Unset
+
 if TYPE_CHECKING:
     from ..models.keyframe_pose import KeyframePose
 
@@ -15,7 +17,7 @@ T = TypeVar("T", bound="MapRun")
 
 @_attrs_define
 class MapRun:
-    """A run in the map.
+    """A run in the map; one that was cut is several, piece after piece.
 
     Attributes:
         run (str): Its name.
@@ -23,6 +25,7 @@ class MapRun:
         num_scans (int): Scans it had when the map was built.
         length_m (float): Metres driven.
         poses (list[KeyframePose]): Poses of its keyframes.
+        first_scan (int | Unset): Sequence number of its first scan: 0 but for later pieces of a run that was cut.
     """
 
     run: str
@@ -30,6 +33,7 @@ class MapRun:
     num_scans: int
     length_m: float
     poses: list[KeyframePose]
+    first_scan: int | Unset = UNSET
     additional_properties: dict[str, Any] = _attrs_field(init=False, factory=dict)
 
     def to_dict(self) -> dict[str, Any]:
@@ -46,6 +50,8 @@ class MapRun:
             poses_item = poses_item_data.to_dict()
             poses.append(poses_item)
 
+        first_scan = self.first_scan
+
         field_dict: dict[str, Any] = {}
         field_dict.update(self.additional_properties)
         field_dict.update(
@@ -57,6 +63,8 @@ class MapRun:
                 "poses": poses,
             }
         )
+        if first_scan is not UNSET:
+            field_dict["first_scan"] = first_scan
 
         return field_dict
 
@@ -80,12 +88,15 @@ class MapRun:
 
             poses.append(poses_item)
 
+        first_scan = d.pop("first_scan", UNSET)
+
         map_run = cls(
             run=run,
             component=component,
             num_scans=num_scans,
             length_m=length_m,
             poses=poses,
+            first_scan=first_scan,
         )
 
         map_run.additional_properties = d

@@ -20,7 +20,9 @@ class Trajectory:
     """Poses of one run.
 
     Attributes:
-        poses (list[StampedPose]): One for every scan that was asked for, in order.
+        poses (list[StampedPose]): One for every scan that was asked for, in order; of a run that was cut, in the map
+            frame, for those of the pieces
+            that lie in the component.
         component (int | None | Unset): Component of the map that the poses belong to; null outside the map frame.
         next_cursor (None | str | Unset): Where the next ones begin, when fewer were wanted than there are; null at the
             end.
