@@ -959,6 +959,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/v1/sites/{site}/runs/{run}/pieces": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The pieces that a run falls in where neither its odometry nor its scans tell how the robot got on: after a jump, a gap,
+         *     when it was carried. A run that could be followed all the way is one piece.
+         */
+        get: operations["list_pieces"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/v1/sites/{site}/runs/{run}/scans": {
         parameters: {
             query?: never;
@@ -1209,6 +1229,11 @@ export interface components {
          * @enum {string}
          */
         ConnectionKind: "driven" | "same_place";
+        /**
+         * @description Why a piece of a run does not go on from the one before.
+         * @enum {string}
+         */
+        CutReason: "jump" | "gap" | "no_returns" | "carried" | "unfollowed";
         /** @description Says of a match whether it is right. */
         Decision: {
             /** @description `veto` or `confirm`. */
@@ -1912,7 +1937,7 @@ export interface components {
             /** @description Where the next page begins; null at the end. */
             next_cursor?: string | null;
         };
-        /** @description A run in the map. */
+        /** @description A run in the map; one that was cut is several, piece after piece. */
         MapRun: {
             /** @description Its name. */
             run: string;
@@ -1921,6 +1946,11 @@ export interface components {
              * @description The component whose frame the poses are in.
              */
             component: number;
+            /**
+             * Format: int64
+             * @description Sequence number of its first scan: 0 but for later pieces of a run that was cut.
+             */
+            first_scan?: number;
             /**
              * Format: int64
              * @description Scans it had when the map was built.
@@ -2554,6 +2584,37 @@ export interface components {
             /** @description Where the next page begins; null at the end. */
             next_cursor?: string | null;
         };
+        /** @description A piece of a run: nothing tells how it lies to the piece before but the map, if that joined them. */
+        RunPiece: {
+            /**
+             * Format: int64
+             * @description Sequence number of its first scan.
+             */
+            from_scan: number;
+            /**
+             * Format: int64
+             * @description Sequence number of its last scan.
+             */
+            to_scan: number;
+            reason?: components["schemas"]["CutReason"] | null;
+            /**
+             * Format: int64
+             * @description The component of the map that it lies in; pieces of one component share a frame. Null when it is in no map.
+             */
+            component?: number | null;
+            /**
+             * Format: double
+             * @description Metres driven in the map; null when it is in no map.
+             */
+            length_m?: number | null;
+        };
+        /** @description Part of a list. */
+        RunPiecePage: {
+            /** @description In order. */
+            items: components["schemas"]["RunPiece"][];
+            /** @description Where the next page begins; null at the end. */
+            next_cursor?: string | null;
+        };
         /**
          * @description Whether a run takes more scans.
          * @enum {string}
@@ -2778,7 +2839,10 @@ export interface components {
              * @description Component of the map that the poses belong to; null outside the map frame.
              */
             component?: number | null;
-            /** @description One for every scan that was asked for, in order. */
+            /**
+             * @description One for every scan that was asked for, in order; of a run that was cut, in the map frame, for those of the pieces
+             *     that lie in the component.
+             */
             poses: components["schemas"]["StampedPose"][];
             /** @description Where the next ones begin, when fewer were wanted than there are; null at the end. */
             next_cursor?: string | null;
@@ -6119,6 +6183,47 @@ export interface operations {
             503: components["responses"]["ServiceUnavailable"];
         };
     };
+    list_pieces: {
+        parameters: {
+            query?: {
+                /** @description The version; the serving one unless said. */
+                version?: number;
+                /** @description Most items to answer; 100 unless said. */
+                limit?: number;
+                /** @description `next_cursor` of the page before. */
+                cursor?: string;
+            };
+            header?: never;
+            path: {
+                /** @description Name of the site, chosen by the client */
+                site: string;
+                /** @description Name of the run in its site, chosen by the client */
+                run: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description A page of pieces, in order */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RunPiecePage"];
+                };
+            };
+            400: components["responses"]["BadRequest"];
+            401: components["responses"]["Unauthorized"];
+            403: components["responses"]["Forbidden"];
+            404: components["responses"]["NotFound"];
+            408: components["responses"]["RequestTimeout"];
+            422: components["responses"]["UnprocessableContent"];
+            429: components["responses"]["TooManyRequests"];
+            500: components["responses"]["InternalServerError"];
+            503: components["responses"]["ServiceUnavailable"];
+        };
+    };
     list_scans: {
         parameters: {
             query?: {
@@ -6178,6 +6283,8 @@ export interface operations {
                 frame?: "map" | "run" | "odom";
                 /** @description Version of the map, when the frame is `map`; the serving one unless said. */
                 version?: number;
+                /** @description In the frame `map` only the pieces of the run that lie in this component; unless said, in that of the first. */
+                component?: number;
                 /** @description Not before, nanoseconds. */
                 from_ns?: number;
                 /** @description Before, nanoseconds. */
@@ -6240,6 +6347,8 @@ export interface operations {
                 frame?: "map" | "run" | "odom";
                 /** @description Version of the map, when the frame is `map`; the serving one unless said. */
                 version?: number;
+                /** @description In the frame `map` only the pieces of the run that lie in this component; unless said, in that of the first. */
+                component?: number;
                 /** @description Not before, nanoseconds. */
                 from_ns?: number;
                 /** @description Before, nanoseconds. */
