@@ -124,3 +124,32 @@ async fn whichever_commit_goes_wrong_the_same_comes_out() {
         }
     }
 }
+
+/// A client that hangs up ends its request wherever it is.
+#[tokio::test]
+async fn a_change_that_nobody_waits_for_any_more_is_made_whole_and_hinders_no_other() {
+    let name = Name::new("s", "site").unwrap();
+    for fault in [Fault::Slow, Fault::Late] {
+        let config = ServerConfig::default();
+        let counting = Arc::new(FaultyStorage::new(Arc::new(MemoryStorage::default()), u64::MAX, fault));
+        let app = Arc::new(App::new(config.clone(), Arc::clone(&counting) as Arc<dyn Storage>));
+        app.make_site(&name, None).await.unwrap();
+        let at = counting.num_commits();
+        let storage = FaultyStorage::new(Arc::new(MemoryStorage::default()), at, fault);
+        let app = Arc::new(App::new(config, Arc::new(storage)));
+        app.make_site(&name, None).await.unwrap();
+        let site = app.site(&name).await.unwrap();
+        let number = site.state().record.next_decision;
+        let next = async || {
+            site.change(|record, _| {
+                record.next_decision += 1;
+                Ok(())
+            })
+            .await
+        };
+        let patience = std::time::Duration::from_millis(50);
+        assert!(tokio::time::timeout(patience, next()).await.is_err(), "{fault:?}: it was quick");
+        next().await.unwrap();
+        assert_eq!(site.state().record.next_decision, number + 2, "{fault:?}");
+    }
+}

@@ -20,6 +20,8 @@ pub(crate) enum Fault {
     CutOff,
     /// It takes long.
     Slow,
+    /// Everything is written, but the answer takes long.
+    Late,
 }
 
 /// What goes wrong and when.
@@ -103,6 +105,11 @@ impl SiteStore for FaultySite {
             Fault::Refused => Err(super::unavailable(&"not now")),
             Fault::Full => Err(StorageError::Full { reason: "no room".into() }),
             Fault::CutOff => self.inner.commit(batch, preconditions).await.and_then(|()| Err(cut_off())),
+            Fault::Late => {
+                self.inner.commit(batch, preconditions).await?;
+                tokio::time::sleep(Duration::from_millis(200)).await;
+                Ok(())
+            }
             Fault::Slow => {
                 tokio::time::sleep(Duration::from_millis(200)).await;
                 self.inner.commit(batch, preconditions).await

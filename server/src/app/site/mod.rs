@@ -43,10 +43,10 @@ pub use translation::{RunTranslator, Translated};
 pub struct Site {
     name: Name,
     store: Arc<dyn SiteStore>,
-    state: RwLock<Arc<SiteState>>,
+    state: Arc<RwLock<Arc<SiteState>>>,
     writers: Mutex<HashMap<Name, Arc<RunWriter>>>,
     /// Held while the record is changed, so that changes of one process queue up instead of conflicting.
-    changing: tokio::sync::Mutex<()>,
+    changing: Arc<tokio::sync::Mutex<()>>,
     pub(in crate::app) making_runs: tokio::sync::Mutex<()>,
     /// Held for reading while scans are appended, for writing while another text generation begins to serve.
     pub(in crate::app) serving: tokio::sync::RwLock<()>,
@@ -101,12 +101,12 @@ impl Site {
         let is_outdated = SiteRecord::is_outdated(&bytes);
         let site = Self {
             name: name.clone(),
-            state: RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?)),
+            state: Arc::new(RwLock::new(Arc::new(SiteState::decode(bytes, birth_if_none)?))),
             jobs: Jobs::load(&*store, stop.clone()).await?,
             events: Arc::new(Events::new(stop.clone())),
             store,
             writers: Mutex::default(),
-            changing: tokio::sync::Mutex::default(),
+            changing: Arc::default(),
             making_runs: tokio::sync::Mutex::default(),
             serving: tokio::sync::RwLock::default(),
             build_requests: AtomicU64::new(0),
@@ -185,7 +185,7 @@ impl Site {
         &self,
         change: impl FnOnce(&mut SiteRecord, &mut Batch) -> Result<T, AppError>,
     ) -> Result<T, AppError> {
-        let _queue = self.changing.lock().await;
+        let queue = Arc::clone(&self.changing).lock_owned().await;
         let before = self.state();
         let mut record = before.record.clone();
         let mut batch = Batch::default();
@@ -193,28 +193,31 @@ impl Site {
         let bytes = record.encode();
         batch.put(Key::Site.encode(), bytes.clone());
         let unchanged = Precondition { key: Key::Site.encode(), expected: Some(before.bytes.clone()) };
-        if let Err(error) = self.store.commit(batch, vec![unchanged]).await {
-            self.reload(&before).await?;
-            return Err(error.into());
-        }
         let config = match record.config_json == before.record.config_json {
             true => Arc::clone(&before.config),
             false => SiteState::decode(bytes.clone(), record.birth)?.config,
         };
-        self.put_state(SiteState { record, config, bytes });
+        let after = SiteState { record, config, bytes };
+        let (store, state) = (Arc::clone(&self.store), Arc::clone(&self.state));
+        // In a task of its own: a client that hangs up ends its request, and must not leave the record behind what is stored.
+        let writing = async move {
+            let _queue = queue;
+            let outcome = store.commit(batch, vec![unchanged]).await;
+            let stands = match &outcome {
+                Ok(()) => Some(after),
+                // After a commit that failed the record may stand as it was or as it should have become.
+                Err(_) => match store.get(&Key::Site.encode()).await? {
+                    Some(bytes) => Some(SiteState::decode(bytes, before.record.birth)?),
+                    None => None,
+                },
+            };
+            if let Some(stands) = stands {
+                *state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(stands);
+            }
+            outcome.map_err(AppError::from)
+        };
+        tokio::spawn(writing).await.map_err(AppError::internal)??;
         Ok(answer)
-    }
-
-    /// After a commit that failed the record may stand as it was or as it should have become.
-    async fn reload(&self, before: &SiteState) -> Result<(), AppError> {
-        if let Some(bytes) = self.store.get(&Key::Site.encode()).await? {
-            self.put_state(SiteState::decode(bytes, before.record.birth)?);
-        }
-        Ok(())
-    }
-
-    fn put_state(&self, state: SiteState) {
-        *self.state.write().unwrap_or_else(PoisonError::into_inner) = Arc::new(state);
     }
 
     /// A run by its name.
