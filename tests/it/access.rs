@@ -74,6 +74,7 @@ const ROUTES: &[(&str, &str, Option<Scope>)] = &[
     ("DELETE", "/v1/sites/{site}/runs/{run}", Some(Scope::Write)),
     ("POST", "/v1/sites/{site}/runs/{run}/finish", Some(Scope::Write)),
     ("POST", "/v1/sites/{site}/runs/{run}/batches", Some(Scope::Write)),
+    ("GET", "/v1/sites/{site}/runs/{run}/pieces", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/runs/{run}/scans", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/runs/{run}/observations", Some(Scope::Read)),
     ("GET", "/v1/sites/{site}/runs/{run}/words", Some(Scope::Read)),
