@@ -27,7 +27,7 @@ pub(crate) struct Candidate {
 /// Profile candidates between different runs, at most one for a pair of anchors and a direction, in order of anchors.
 ///
 /// Every two runs are compared on their own: among the runs of many buildings those of other buildings would take the
-/// few places that each window has to give. The pieces of a body are one building, and are compared with a run together;
+/// few places that each window has to give. The exemplars of a body are one building, and are compared with a run together;
 /// those of two bodies were compared when they were new. Of every two the best `max_candidates_per_pair` are kept.
 pub(crate) fn candidates_across(site: &SiteAnchors<'_>) -> Vec<Candidate> {
     let spacing_m = site.config.retrieval.sample_spacing_m;

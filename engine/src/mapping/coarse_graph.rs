@@ -39,9 +39,9 @@ pub(crate) struct CoarseGraph<'a> {
 }
 
 impl<'a> CoarseGraph<'a> {
-    /// Runs with the poses that their anchors have, pieces with that of their body; nothing is optimized yet.
+    /// Runs with the poses that their anchors have, exemplars with that of their body; nothing is optimized yet.
     ///
-    /// All pieces of a body must be among the runs or none.
+    /// All exemplars of a body must be among the runs or none.
     pub fn new(
         site: &'a SiteAnchors<'a>,
         mut runs: Vec<RunIdx>,
@@ -96,9 +96,9 @@ impl<'a> CoarseGraph<'a> {
         self.in_body(anchor).map_or(pose, |body_from_anchor| pose.compose(&body_from_anchor))
     }
 
-    /// Where the body of a piece lies.
-    pub fn pose_of_body(&self, piece: RunIdx) -> Pose2 {
-        self.graph.poses()[self.first_node(piece)]
+    /// Where the body of an exemplar lies.
+    pub fn pose_of_body(&self, exemplar: RunIdx) -> Pose2 {
+        self.graph.poses()[self.first_node(exemplar)]
     }
 
     /// Where an anchor lies in its body, if it has one.

@@ -79,7 +79,7 @@ impl<'a> Component<'a> {
             .collect()
     }
 
-    /// A body of the foundation, where it lies, with what its pieces said of each other.
+    /// A body of the foundation, where it lies, with what its exemplars said of each other.
     ///
     /// # Errors
     /// Poses that are not finite.
@@ -89,7 +89,7 @@ impl<'a> Component<'a> {
         settled: Opinions,
     ) -> Result<Self, MappingError> {
         let pose_of = |anchor| site.anchor(anchor).run_from_anchor;
-        let graph = CoarseGraph::new(site, site.pieces_of(body), pose_of, |_| Pose2::identity())?;
+        let graph = CoarseGraph::new(site, site.exemplars_of(body), pose_of, |_| Pose2::identity())?;
         Ok(Self::new(graph, Some(settled)))
     }
 
@@ -201,14 +201,17 @@ impl<'a> Component<'a> {
         guests: &[(Self, Box<Self>)],
         workshop: Workshop<'a>,
     ) -> Result<Self, MappingError> {
-        let piece = body.graph.runs()[0];
+        let exemplar = body.graph.runs()[0];
         let of_guests = guests.iter().flat_map(|(alone, _)| alone.graph.runs());
         let runs = body.graph.runs().iter().chain(of_guests).copied().collect();
         let pose_of = |anchor: AnchorIdx| {
             let of_it = guests.iter().map(|(_, both)| &both.graph).find(|graph| graph.holds(anchor));
-            of_it.map_or_else(Pose2::identity, |graph| graph.pose_of_body(piece).between(&graph.pose(anchor)))
+            of_it.map_or_else(Pose2::identity, |graph| {
+                graph.pose_of_body(exemplar).between(&graph.pose(anchor))
+            })
         };
-        let graph = CoarseGraph::new(body.graph.site, runs, pose_of, |piece| body.graph.pose_of_body(piece))?;
+        let graph =
+            CoarseGraph::new(body.graph.site, runs, pose_of, |exemplar| body.graph.pose_of_body(exemplar))?;
         let mut settled = body.own_opinions(workshop);
         guests.iter().for_each(|(alone, _)| settled += alone.own_opinions(workshop));
         let mut founded = Self::new(graph, Some(settled));
@@ -231,9 +234,9 @@ impl<'a> Component<'a> {
             true => host.graph.pose(anchor),
             false => way.host_from_guest.compose(&guest.graph.pose(anchor)),
         };
-        let pose_of_body = |piece: RunIdx| match host.graph.runs().binary_search(&piece) {
-            Ok(_) => host.graph.pose_of_body(piece),
-            Err(_) => way.host_from_guest.compose(&guest.graph.pose_of_body(piece)),
+        let pose_of_body = |exemplar: RunIdx| match host.graph.runs().binary_search(&exemplar) {
+            Ok(_) => host.graph.pose_of_body(exemplar),
+            Err(_) => way.host_from_guest.compose(&guest.graph.pose_of_body(exemplar)),
         };
         let graph = CoarseGraph::new(host.graph.site, runs, pose_of, pose_of_body)?;
         let holds_body = host.settled.is_some() || guest.settled.is_some();

@@ -19,7 +19,7 @@ const MAX_STRETCH: u32 = 25;
 
 /// A finished map, with what the next one may be founded upon.
 pub(crate) struct Finished {
-    /// Of pieces and runs, in the order in which they were told.
+    /// Of exemplars and runs, in the order in which they were told.
     pub map: SiteMap,
     /// For each body where it lies in the map.
     pub map_from_bodies: Vec<Pose2>,
@@ -76,14 +76,14 @@ pub(crate) fn finished(
 /// For each body where it lies in its component.
 fn map_from_bodies(components: &[Component<'_>], site: &SiteAnchors<'_>) -> Vec<Pose2> {
     let mut map_from_bodies = Vec::new();
-    for piece in site.runs() {
-        if site.body_of(piece).is_none_or(|body| body.at() != map_from_bodies.len()) {
+    for exemplar in site.runs() {
+        if site.body_of(exemplar).is_none_or(|body| body.at() != map_from_bodies.len()) {
             continue;
         }
-        let is_of_it = |component: &&Component<'_>| component.graph.runs().binary_search(&piece).is_ok();
+        let is_of_it = |component: &&Component<'_>| component.graph.runs().binary_search(&exemplar).is_ok();
         let Some(component) = components.iter().find(is_of_it) else { continue };
         let map_from_graph = map_from_graph(component, first_told(component));
-        map_from_bodies.push(map_from_graph.compose(&component.graph.pose_of_body(piece)));
+        map_from_bodies.push(map_from_graph.compose(&component.graph.pose_of_body(exemplar)));
     }
     map_from_bodies
 }
@@ -94,7 +94,7 @@ fn first_told(component: &Component<'_>) -> RunIdx {
     *runs.iter().min_by_key(|run| site.told(**run)).unwrap_or(&runs[0])
 }
 
-/// The frame of a component is where the run that was told first began, or that of its body if it is a piece.
+/// The frame of a component is where the run that was told first began, or that of its body if it is an exemplar.
 fn map_from_graph(component: &Component<'_>, first: RunIdx) -> Pose2 {
     let site = component.graph.site;
     if site.body_of(first).is_some() {

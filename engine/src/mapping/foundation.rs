@@ -1,8 +1,8 @@
 //! What a map is founded upon, so that one more run costs the same after years: the fold over the runs of a site.
 //!
 //! Runs are mapped in generations, in the order in which the site lists them. When a generation is full its map becomes the
-//! foundation: components whose poses stay, each with a bounded number of pieces of runs that stand for its places, and
-//! what is to be served of the runs in it. Whatever follows is laid over those pieces.
+//! foundation: components whose poses stay, each with a bounded number of exemplars of runs that stand for its places, and
+//! what is to be served of the runs in it. Whatever follows is laid over those exemplars.
 
 use std::collections::BTreeMap;
 
@@ -11,13 +11,13 @@ use serde::{Deserialize, Serialize};
 use super::component::{Component, Workshop};
 use super::condense::condensed;
 use super::config::MappingConfig;
+use super::exemplar::Exemplar;
 use super::finish::{Finished, finished};
 use super::indices::BodyIdx;
 use super::joining::join;
 use super::judgements::{Judgements, settle};
 use super::memo::RegistrationMemo;
 use super::null::Null;
-use super::piece::Piece;
 use super::place_match::{Channel, Decision, PlaceMatch};
 use super::placement::place_observations;
 use super::run::RunRecord;
@@ -60,7 +60,7 @@ struct Body {
     /// What its places said of each other.
     opinions: Opinions,
     /// What stands for it, in the order in which it was driven.
-    pieces: Vec<Piece>,
+    exemplars: Vec<Exemplar>,
 }
 
 /// The settings of a map, and what is done for it beside registration.
@@ -89,7 +89,11 @@ impl Foundation {
 
     /// Number of keyframes that are kept to stand for all that was driven.
     pub fn num_keyframes(&self) -> usize {
-        self.bodies.iter().flat_map(|body| &body.pieces).map(|piece| piece.record().keyframes.len()).sum()
+        self.bodies
+            .iter()
+            .flat_map(|body| &body.exemplars)
+            .map(|exemplar| exemplar.record().keyframes.len())
+            .sum()
     }
 
     /// The map of the settled runs and of those behind them, at most a generation.
@@ -106,14 +110,14 @@ impl Foundation {
     ) -> Result<Extended, MappingError> {
         let config = settings.mapping;
         memo.prepare(&config.submap);
-        let pieces: Vec<Vec<RunRecord<'_>>> =
-            self.bodies.iter().map(|body| body.pieces.iter().map(Piece::record).collect()).collect();
-        let told = Told::new(self.bodies.iter().flat_map(|body| &body.pieces), self.num_runs());
-        let records: Vec<RunRecord<'_>> = pieces.iter().flatten().chain(runs).copied().collect();
+        let exemplars: Vec<Vec<RunRecord<'_>>> =
+            self.bodies.iter().map(|body| body.exemplars.iter().map(Exemplar::record).collect()).collect();
+        let told = Told::new(self.bodies.iter().flat_map(|body| &body.exemplars), self.num_runs());
+        let records: Vec<RunRecord<'_>> = exemplars.iter().flatten().chain(runs).copied().collect();
         let told_decisions = told.decisions(decisions);
-        let mut made = self.made((&pieces, runs), (config, &told_decisions), &records, memo, watch)?;
+        let mut made = self.made((&exemplars, runs), (config, &told_decisions), &records, memo, watch)?;
         if let Some(matching) = settings.matching {
-            weigh_new_texts(&records, told.num_pieces(), &mut made.map, matching);
+            weigh_new_texts(&records, told.num_exemplars(), &mut made.map, matching);
         }
         memo.turn();
         let map = self.with_settled(&made, &told, decisions);
@@ -121,16 +125,16 @@ impl Foundation {
         Ok(Extended { map, foundation })
     }
 
-    /// The map of pieces and new runs.
+    /// The map of exemplars and new runs.
     fn made(
         &self,
-        (pieces, runs): (&[Vec<RunRecord<'_>>], &[RunRecord<'_>]),
+        (exemplars, runs): (&[Vec<RunRecord<'_>>], &[RunRecord<'_>]),
         (config, decisions): (&MappingConfig, &[Decision]),
         records: &[RunRecord<'_>],
         memo: &RegistrationMemo,
         watch: Watch<'_>,
     ) -> Result<Finished, MappingError> {
-        let site = SiteAnchors::new(pieces, runs, config);
+        let site = SiteAnchors::new(exemplars, runs, config);
         let judgements = Judgements::new(decisions, &site);
         let workshop =
             Workshop { site: &site, judgements: &judgements, memo, span: watch.stage(MapStage::Settling) };
@@ -142,7 +146,7 @@ impl Foundation {
         Ok(finished(joined, workshop, records, is_full(runs, config)))
     }
 
-    /// A map of pieces and new runs as one of all runs of the site.
+    /// A map of exemplars and new runs as one of all runs of the site.
     fn with_settled(&self, made: &Finished, told: &Told, decisions: &[Decision]) -> SiteMap {
         let mut numbers: BTreeMap<u32, u32> = BTreeMap::new();
         let mut num_components = 0;
@@ -152,17 +156,17 @@ impl Foundation {
             num_components = num_components.max(number + 1);
             number
         };
-        let first_pieces = self.first_pieces();
+        let first_exemplars = self.first_exemplars();
         let settled = self.runs.iter().map(|run| {
             let place =
-                run.body.map(|body| (first_pieces[body as usize], made.map_from_bodies[body as usize]));
-            let component = number(place.map(|(piece, _)| made.map.runs[piece].component));
+                run.body.map(|body| (first_exemplars[body as usize], made.map_from_bodies[body as usize]));
+            let component = number(place.map(|(exemplar, _)| made.map.runs[exemplar].component));
             let moved = place.map(|(_, map_from_body)| map_from_body).filter(|by| *by != Pose2::identity());
             let moved = |pose: &Pose2| moved.map_or(*pose, |by| by.compose(pose));
             MappedRun { component, map_from_keyframes: run.map_from_keyframes.iter().map(moved).collect() }
         });
         let mut runs: Vec<MappedRun> = settled.collect();
-        for run in &made.map.runs[told.num_pieces()..] {
+        for run in &made.map.runs[told.num_exemplars()..] {
             runs.push(MappedRun { component: number(Some(run.component)), ..run.clone() });
         }
         let named = |found: &PlaceMatch| told.named(found);
@@ -173,59 +177,59 @@ impl Foundation {
         SiteMap { matches, refused, runs, num_components }
     }
 
-    /// For each body the place of its first piece among those of all.
-    fn first_pieces(&self) -> Vec<usize> {
+    /// For each body the place of its first exemplar among those of all.
+    fn first_exemplars(&self) -> Vec<usize> {
         let mut next = 0;
         let first = |body: &Body| {
-            next += body.pieces.len();
-            next - body.pieces.len()
+            next += body.exemplars.len();
+            next - body.exemplars.len()
         };
         self.bodies.iter().map(first).collect()
     }
 
     /// The foundation with the new runs in it, where the map puts them.
     fn closed(&self, made: &Finished, map: &SiteMap, runs: &[RunRecord<'_>], config: &MappingConfig) -> Self {
-        let num_pieces = made.map.runs.len() - runs.len();
-        // Components of the finished map by their number in it, with their pieces and how many of these were chosen before.
-        let mut grown: BTreeMap<u32, (Opinions, Vec<Piece>, usize)> = BTreeMap::new();
+        let num_exemplars = made.map.runs.len() - runs.len();
+        // Components of the finished map by their number in it, with their exemplars and how many of these were chosen before.
+        let mut grown: BTreeMap<u32, (Opinions, Vec<Exemplar>, usize)> = BTreeMap::new();
         for ((body, &first), map_from_body) in
-            self.bodies.iter().zip(&self.first_pieces()).zip(&made.map_from_bodies)
+            self.bodies.iter().zip(&self.first_exemplars()).zip(&made.map_from_bodies)
         {
             let made_number = made.map.runs[first].component;
             let of_it =
                 grown.entry(made_number).or_insert((made.opinions[made_number as usize], Vec::new(), 0));
             of_it.0 += body.opinions;
-            of_it.1.extend(body.pieces.iter().map(|piece| piece.moved(map_from_body)));
-            // The others were chosen for another body, and may stand where this one has pieces already.
-            of_it.2 = if of_it.2 == 0 { body.pieces.len() } else { of_it.2 };
+            of_it.1.extend(body.exemplars.iter().map(|exemplar| exemplar.moved(map_from_body)));
+            // The others were chosen for another body, and may stand where this one has exemplars already.
+            of_it.2 = if of_it.2 == 0 { body.exemplars.len() } else { of_it.2 };
         }
-        for (idx, (record, mapped)) in runs.iter().zip(&made.map.runs[num_pieces..]).enumerate() {
+        for (idx, (record, mapped)) in runs.iter().zip(&made.map.runs[num_exemplars..]).enumerate() {
             if mapped.map_from_keyframes.is_empty() {
                 continue;
             }
             let opinions = made.opinions[mapped.component as usize];
             let observed = place_observations(record, mapped);
             let run = (self.num_runs() + idx) as u32;
-            let piece = Piece::whole(run, record, &mapped.map_from_keyframes, &observed);
-            grown.entry(mapped.component).or_insert((opinions, Vec::new(), 0)).1.push(piece);
+            let exemplar = Exemplar::whole(run, record, &mapped.map_from_keyframes, &observed);
+            grown.entry(mapped.component).or_insert((opinions, Vec::new(), 0)).1.push(exemplar);
         }
         let body_of: BTreeMap<u32, u32> = grown.keys().copied().zip(0..).collect();
         let made_number = |place: usize| match place.checked_sub(self.num_runs()) {
-            Some(new) => made.map.runs[num_pieces + new].component,
+            Some(new) => made.map.runs[num_exemplars + new].component,
             None => self.runs[place]
                 .body
-                .map_or(u32::MAX, |body| made.map.runs[self.first_pieces()[body as usize]].component),
+                .map_or(u32::MAX, |body| made.map.runs[self.first_exemplars()[body as usize]].component),
         };
         let settled = |(place, run): (usize, &MappedRun)| SettledRun {
             body: body_of.get(&made_number(place)).copied(),
             map_from_keyframes: run.map_from_keyframes.clone(),
         };
-        let body = |(opinions, pieces, num_kept): (Opinions, Vec<Piece>, usize)| {
-            let area = pieces.iter().find_map(Piece::area).map(str::to_owned);
-            let chosen = condensed(&pieces, num_kept, config).into_iter();
+        let body = |(opinions, exemplars, num_kept): (Opinions, Vec<Exemplar>, usize)| {
+            let area = exemplars.iter().find_map(Exemplar::area).map(str::to_owned);
+            let chosen = condensed(&exemplars, num_kept, config).into_iter();
             Body {
                 opinions: opinions.faded(),
-                pieces: chosen.map(|piece| piece.in_area(area.clone())).collect(),
+                exemplars: chosen.map(|exemplar| exemplar.in_area(area.clone())).collect(),
             }
         };
         Self {

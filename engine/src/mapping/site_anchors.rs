@@ -33,13 +33,13 @@ pub(crate) struct Anchor {
 /// What the map builder decides between two runs may depend on which comes first, by a rounding at least. So runs are
 /// ordered by what they recorded, and whoever makes the same recordings in another order gets the same map.
 ///
-/// Pieces of the foundation count as runs here and come before all others. The frame of a piece is that of its body.
+/// Exemplars of the foundation count as runs here and come before all others. The frame of an exemplar is that of its body.
 pub(crate) struct SiteAnchors<'a> {
     pub config: &'a MappingConfig,
     runs: Vec<RunRecord<'a>>,
     /// For each run its place in the list that the map builder was given.
     told: Vec<usize>,
-    /// For each run the body of which it is a piece, if it is one.
+    /// For each run the body of which it is an exemplar, if it is one.
     bodies: Vec<Option<BodyIdx>>,
     anchors: Vec<Anchor>,
     /// Covariance of the refined odometry from each anchor to the next of its run.
@@ -53,17 +53,17 @@ pub(crate) struct SiteAnchors<'a> {
 }
 
 impl<'a> SiteAnchors<'a> {
-    /// Orders the runs and chooses their anchors; `pieces` are those of each body, and are told before the others.
-    pub fn new(pieces: &[Vec<RunRecord<'a>>], given: &[RunRecord<'a>], config: &'a MappingConfig) -> Self {
+    /// Orders the runs and chooses their anchors; `exemplars` are those of each body, and are told before the others.
+    pub fn new(exemplars: &[Vec<RunRecord<'a>>], given: &[RunRecord<'a>], config: &'a MappingConfig) -> Self {
         let of_body =
-            |(body, pieces): (usize, &Vec<RunRecord<'a>>)| vec![Some(BodyIdx::new(body)); pieces.len()];
-        let mut bodies: Vec<Option<BodyIdx>> = pieces.iter().enumerate().flat_map(of_body).collect();
-        let num_pieces = bodies.len();
-        bodies.resize(num_pieces + given.len(), None);
-        let mut runs: Vec<RunRecord<'a>> = pieces.iter().flatten().copied().collect();
+            |(body, exemplars): (usize, &Vec<RunRecord<'a>>)| vec![Some(BodyIdx::new(body)); exemplars.len()];
+        let mut bodies: Vec<Option<BodyIdx>> = exemplars.iter().enumerate().flat_map(of_body).collect();
+        let num_exemplars = bodies.len();
+        bodies.resize(num_exemplars + given.len(), None);
+        let mut runs: Vec<RunRecord<'a>> = exemplars.iter().flatten().copied().collect();
         let order = order_of(given);
         runs.extend(order.iter().map(|&place| given[place]));
-        let told = (0..num_pieces).chain(order.iter().map(|place| num_pieces + place)).collect();
+        let told = (0..num_exemplars).chain(order.iter().map(|place| num_exemplars + place)).collect();
         let travels_m: Vec<Vec<f64>> = runs.iter().map(|run| travel_of(run.keyframes)).collect();
         let mut chosen = Vec::new();
         let mut starts = vec![0];
@@ -106,17 +106,17 @@ impl<'a> SiteAnchors<'a> {
         self.runs().filter(|&run| self.body_of(run).is_none() && !self.of_run(run).is_empty()).collect()
     }
 
-    /// The body of the foundation of which a run is a piece, if it is one.
+    /// The body of the foundation of which a run is an exemplar, if it is one.
     pub fn body_of(&self, run: RunIdx) -> Option<BodyIdx> {
         self.bodies[run.at()]
     }
 
-    /// Pieces of a body, ascending.
-    pub fn pieces_of(&self, body: BodyIdx) -> Vec<RunIdx> {
+    /// Exemplars of a body, ascending.
+    pub fn exemplars_of(&self, body: BodyIdx) -> Vec<RunIdx> {
         self.runs().filter(|&run| self.body_of(run) == Some(body)).collect()
     }
 
-    /// True when where two runs lie to each other is settled: they are pieces of one body.
+    /// True when where two runs lie to each other is settled: they are exemplars of one body.
     pub fn are_settled(&self, a: RunIdx, b: RunIdx) -> bool {
         self.body_of(a).is_some() && self.body_of(a) == self.body_of(b)
     }

@@ -57,7 +57,7 @@ type Cells = BTreeMap<(u32, i32, i32), Vec<Place>>;
 /// All stretches, in order of the later one.
 ///
 /// `poses` holds for each run the poses of its observations, `components` the frame in which they are given, `bodies` the
-/// body of the foundation that it is a piece of: what two pieces of one body share was found before. Of many
+/// body of the foundation that it is an exemplar of: what two exemplars of one body share was found before. Of many
 /// passes beside a visit those come first that were registered with it, then those that lie nearest: a place that was
 /// driven a thousand times is worth no more matches than one that was driven twice.
 pub(crate) fn find_stretches(

@@ -1,27 +1,27 @@
-//! From the numbers of pieces and new runs, among which a map is made, to those of the runs of the site, and back.
+//! From the numbers of exemplars and new runs, among which a map is made, to those of the runs of the site, and back.
 
-use super::piece::{Piece, Source};
+use super::exemplar::{Exemplar, Source};
 use super::place_match::{Decision, PlaceMatch};
 use crate::text::Interval;
 
-/// How pieces and new runs, in the order in which they are told to the map builder, are named in the site.
+/// How exemplars and new runs, in the order in which they are told to the map builder, are named in the site.
 pub(crate) struct Told {
-    /// For each piece where it was cut from and how many observations it has.
-    pieces: Vec<(Source, u32)>,
+    /// For each exemplar where it was cut from and how many observations it has.
+    exemplars: Vec<(Source, u32)>,
     /// Runs of the site that are settled; the new ones follow them.
     num_settled: u32,
 }
 
 impl Told {
-    /// Pieces of all bodies, then the runs behind the settled ones.
-    pub fn new<'p>(pieces: impl Iterator<Item = &'p Piece>, num_settled: usize) -> Self {
-        let pieces = pieces.map(|piece| (piece.source, piece.num_observations())).collect();
-        Self { pieces, num_settled: num_settled as u32 }
+    /// Exemplars of all bodies, then the runs behind the settled ones.
+    pub fn new<'p>(exemplars: impl Iterator<Item = &'p Exemplar>, num_settled: usize) -> Self {
+        let exemplars = exemplars.map(|exemplar| (exemplar.source, exemplar.num_observations())).collect();
+        Self { exemplars, num_settled: num_settled as u32 }
     }
 
-    /// Number of pieces.
-    pub fn num_pieces(&self) -> usize {
-        self.pieces.len()
+    /// Number of exemplars.
+    pub fn num_exemplars(&self) -> usize {
+        self.exemplars.len()
     }
 
     /// A match as the site names its runs, observations and keyframes.
@@ -33,7 +33,7 @@ impl Told {
             registration.earlier_keyframe += self.source(found.earlier.run_idx).first_keyframe;
             registration.later_keyframe += self.source(found.later.run_idx).first_keyframe;
         }
-        // Pieces are told by their bodies, so that of two bodies the later run may come first.
+        // Exemplars are told by their bodies, so that of two bodies the later run may come first.
         if (found.earlier <= found.later) != (named.earlier <= named.later) {
             std::mem::swap(&mut named.earlier, &mut named.later);
             named.evidence.registration = named.evidence.registration.map(|seen| seen.seen_from_later());
@@ -41,7 +41,7 @@ impl Told {
         named
     }
 
-    /// Decisions as they concern pieces and new runs; one on what no piece holds concerns none.
+    /// Decisions as they concern exemplars and new runs; one on what no exemplar holds concerns none.
     pub fn decisions(&self, decisions: &[Decision]) -> Vec<Decision> {
         let mut told = Vec::new();
         for decision in decisions {
@@ -58,10 +58,10 @@ impl Told {
     }
 
     fn source(&self, told: u32) -> Source {
-        match self.pieces.get(told as usize) {
+        match self.exemplars.get(told as usize) {
             Some((source, _)) => *source,
             None => {
-                let run = self.num_settled + told - self.pieces.len() as u32;
+                let run = self.num_settled + told - self.exemplars.len() as u32;
                 Source { run, first_observation: 0, first_keyframe: 0 }
             }
         }
@@ -72,11 +72,11 @@ impl Told {
         Interval { run_idx: run, first: told.first + first_observation, last: told.last + first_observation }
     }
 
-    /// An interval of the site as parts of pieces, or as one of a new run.
+    /// An interval of the site as parts of exemplars, or as one of a new run.
     fn told(&self, interval: &Interval) -> Vec<Interval> {
         let Interval { run_idx, first, last } = *interval;
         if let Some(new) = run_idx.checked_sub(self.num_settled) {
-            return vec![Interval { run_idx: self.pieces.len() as u32 + new, ..*interval }];
+            return vec![Interval { run_idx: self.exemplars.len() as u32 + new, ..*interval }];
         }
         let within = |(place, (source, num_observations)): (usize, &(Source, u32))| {
             let start = source.first_observation;
@@ -87,6 +87,6 @@ impl Told {
                 last: (last - start).min(num_observations - 1),
             })
         };
-        self.pieces.iter().enumerate().filter_map(within).collect()
+        self.exemplars.iter().enumerate().filter_map(within).collect()
     }
 }

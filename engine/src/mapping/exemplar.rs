@@ -1,4 +1,4 @@
-//! Pieces of runs that stand for a place once it is settled: what was recorded there, in the frame of its body.
+//! Exemplars of runs that stand for a place once it is settled: what was recorded there, in the frame of its body.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::geometry::Pose2;
 use crate::scan::ScanGeometry;
 use crate::text::{Observation, Word};
 
-/// Where a piece was cut from.
+/// Where an exemplar was cut from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct Source {
     /// The run, by its place in the list of a site.
@@ -22,7 +22,7 @@ pub(crate) struct Source {
 
 /// A stretch of a run that is kept with all that it saw. Poses are given in the frame of its body and stay.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub(crate) struct Piece {
+pub(crate) struct Exemplar {
     pub source: Source,
     /// True when nothing else was there before: it keeps the place where it is, whatever comes later.
     pub is_founder: bool,
@@ -33,15 +33,15 @@ pub(crate) struct Piece {
     keyframes: Vec<Keyframe>,
 }
 
-/// A part of a piece of about equal length, with what stands for it.
+/// A part of an exemplar of about equal length, with what stands for it.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
     pub keyframes: Range<usize>,
-    /// A pose for every anchor spacing, with the travel from the beginning of the piece, metres.
+    /// A pose for every anchor spacing, with the travel from the beginning of the exemplar, metres.
     pub places: Vec<(Pose2, f64)>,
 }
 
-impl Piece {
+impl Exemplar {
     /// A whole run where the map puts it.
     pub fn whole(run: u32, record: &RunRecord<'_>, map_from_keyframes: &[Pose2], observed: &[Pose2]) -> Self {
         let keyframe =
@@ -169,7 +169,7 @@ fn words_within(words: &[Word], observations: &Range<usize>) -> Vec<Word> {
         let mut word = word.clone();
         word.id.index -= firsts[usize::from(word.id.level)];
         word.observations = (word.observations.0 - start, word.observations.1 - start);
-        // Nobody reads them of a finished text, and those before the piece have no name in it.
+        // Nobody reads them of a finished text, and those before the exemplar have no name in it.
         word.predecessors = Vec::new();
         word
     };
