@@ -55,9 +55,11 @@ impl OdometryRefiner {
         if settled.inlier_share >= sure_share {
             return None;
         }
-        // A robot that turned too fast sees much that is new; one that is elsewhere at once sees nothing that can be believed.
+        // A robot that turned too fast sees much that is new; one that is elsewhere at once, or that nothing but its scans has
+        // followed through a gap, sees nothing that can be believed.
         let is_elsewhere = before.is_some_and(|doubt| doubt.is_elsewhere)
             || (reason == CutReason::Jump && expected.is_far)
+            || (reason == CutReason::Gap && !expected.is_by_odometry)
             || reason == CutReason::Unfollowed;
         // What fits a little and takes nothing away may be true, as may what a robot can have driven.
         let may_be = !is_elsewhere && (expected.is_by_odometry || settled.is_registered);
