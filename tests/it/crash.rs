@@ -114,7 +114,7 @@ async fn everything(api: &Api) -> Vec<String> {
 #[tokio::test(flavor = "multi_thread")]
 async fn twenty_kills_lose_nothing_and_change_no_byte() {
     let binary = locution_tests::locution_binary();
-    let scans = drive(6_000, 11);
+    let scans = drive(10_000, 11);
     let mut rng = ChaCha8Rng::seed_from_u64(20);
     let directory = tempfile::tempdir().unwrap();
     let mut process = Process::start(&binary, directory.path());

@@ -76,7 +76,11 @@ impl DataDirectory {
 
     /// Lets go of it; it must not be used afterwards.
     pub fn release(&self) {
-        self.lock.lock().unwrap_or_else(PoisonError::into_inner).take();
+        let lock = self.lock.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(lock) = lock {
+            // A process that is just being started holds a copy of the file until its program is loaded, and with it the lock.
+            let _ = fs2::FileExt::unlock(&lock);
+        }
     }
 
     /// Where a site lives.

@@ -142,6 +142,10 @@ class Site:
         answer = self._transport.send(routes.DELETE_RUN, self.name, run)
         return models.Job.from_dict(answer.json()) if answer.status_code == 202 else None
 
+    def pieces(self, run: str, version: int | None = None) -> Iterator[models.RunPiece]:
+        """Parts into which a run falls where its robot could not be followed, and why; one of most runs."""
+        return self._transport.all(models.RunPiece, routes.LIST_PIECES, self.name, run, query={"version": version})
+
     def scans(self, run: str, limit: int | None = None) -> Iterator[models.StoredScan]:
         """Scans as they are stored; `limit` is that of a page."""
         query = {"limit": limit}
