@@ -115,17 +115,6 @@ def test_a_robot_maps_and_the_next_is_told_where_it_is(
     wait_for(lambda: follower.published["map"])
     grid = follower.published["map"][0]
     assert (grid.info.height, grid.info.width) == built.grid().cells.shape
-    parameters["map_channel"] = "stable"
-    waiting = node_module.LocutionNode()
-    time.sleep(0.5)
-    assert not waiting.published["map"], "there is no such channel yet"
-    site.move_channel("stable")
-    wait_for(lambda: waiting.published["map"] and list(site.channel_robots("stable")))
-    assert [(r.robot, r.map_version, r.is_current) for r in site.channel_robots("stable")] == [
-        ("porter", built.version, True)
-    ]
-    waiting.stop()
-    parameters["map_channel"] = ""
 
     answers: list[Any] = []
     feedback: list[Any] = []
@@ -162,6 +151,16 @@ def test_a_robot_maps_and_the_next_is_told_where_it_is(
     ]
     assert follower.services["~/publish_initialpose"](None, SimpleNamespace()).success
     follower.stop()
+    parameters["map_channel"] = "stable"
+    waiting = node_module.LocutionNode()
+    time.sleep(0.5)
+    assert not waiting.published["map"], "there is no such channel yet"
+    version = site.move_channel("stable").map_version
+    wait_for(lambda: waiting.published["map"] and list(site.channel_robots("stable")))
+    assert [(r.robot, r.map_version, r.is_current) for r in site.channel_robots("stable")] == [
+        ("porter", version, True)
+    ]
+    waiting.stop()
 
 
 def test_an_action_that_takes_too_long_is_aborted(parameters: dict[str, Any]) -> None:
